@@ -7,9 +7,9 @@
 #include "adjustment/considered.hpp"
 #include "adjustment/smoothness.hpp"
 #include "diagnosis/fault_search.hpp"
-#include "diagnosis/fault_tests.hpp"
 #include "diagnosis/prior_scatter.hpp"
 #include "diagnosis/reliability.hpp"
+#include "diagnosis/said_faults.hpp"
 #include "diagnosis/verdict.hpp"
 #include "evaluation/fit_test.hpp"
 #include "stepdiag/core/error.hpp"
@@ -102,9 +102,10 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
     refuse_foreign_distances(measurement, plan);
 
-    FaultSearch faults(of_all, options, smoothness_at_start(options));
-    const std::shared_ptr<Solution> solution = faults.run();
-    if (!solution) refuse_unsolved(measurement, plan);
+    const FaultContext context(of_all, options, smoothness_at_start(options));
+    const std::optional<FaultState> faults = search_faults(context);
+    if (!faults) refuse_unsolved(measurement, plan);
+    const std::shared_ptr<Solution>& solution = faults->solution;
     const AdjustmentProblem& problem = solution->problem();
     const Observability& observability = solution->observability();
     GaussNewton& solver = solution->solver();
@@ -122,7 +123,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
     result.calibration.findings = observability.findings(known);
     if (!is_anything_determined(result.calibration)) throw NothingDetermined("adjustment", result.calibration.findings);
-    result.faults = faults.classes(*solution, forms, measurement);
+    result.faults = said_faults(context, *faults, forms, measurement);
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) add_covariance(problem, forms, solver.factor(), result.calibration);
     result.setup = setup_estimates(problem, known, x, inverse);
@@ -149,7 +150,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         result.verdict.reasons.push_back(reason);
     }
     const double noise = std::sqrt(std::max(1.0, result.variance_factor()));
-    result.unseen = unseen_faults(*solution, faults.tests(*solution), forms, noise);
+    result.unseen = unseen_faults(*solution, *tests_now(context, *faults)->tests, forms, noise);
     if (options.reliability) result.reliability = reliability(*solution, forms, noise);
     if (options.scale_uncertainty) scale_uncertainties(result);
     add_deviation_effects(deviation_effects(solver, options), problem, forms, observability, result);

@@ -2,562 +2,259 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
-#include "stepdiag/evaluation/thresholds.hpp"
+#include "diagnosis/fault_class.hpp"
 
 namespace stepdiag {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double twin = 0.99;  // correlation of what shows the same in all other readings
-constexpr std::size_t most_exact = 20;
-constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
+using namespace search_limits;
 
-// Two-sided, squared: 28 for a probability of 1.2e-7.
-double gain_of_probability(double probability) { return std::pow(Eigen::numext::ndtri(0.5 * probability), 2); }
+// Its steps: each takes a state and returns the next one, or none where there is none.
+class Search {
+public:
+    explicit Search(const FaultContext& context) : context_(context) {}
 
-// How much larger than stated the scatter is where a fault has taken its part of chi-square.
-double noise(double square_sum, int freedom) { return freedom > 0 ? std::max(1.0, square_sum / freedom) : 1.0; }
+    std::optional<FaultState> run() const;
 
-}  // namespace
+private:
+    using SolutionPointer = FaultContext::SolutionPointer;
 
-struct FaultSearch::Tested {
-    std::unique_ptr<FaultHypotheses> hypotheses;
-    std::unique_ptr<FaultTests> tests;
-    double square_sum = 0.0;
-    int freedom = 0;
-    SolutionPointer at = nullptr;  // kept for the tests, where nobody else does
-
-    double noise_beside(double gain) const { return noise(square_sum - gain, freedom - 1); }
-    // Whether so many more faults leave a scatter that nobody believes: the worst is found first. One that hides behind
-    // others may be larger than they.
-    bool is_hopeless(double gain, int more) const {
-        constexpr double hidden = 3.0;
-        return square_sum - thresholds.largest_variance_factor() * freedom > hidden * gain * more;
+    SolutionPointer adjust_all() const;
+    std::optional<FaultState> without_gross(const SolutionPointer& all) const;
+    std::optional<FaultState> found_linearly(const SolutionPointer& where, const SolutionPointer& before) const;
+    FaultState find_more(FaultState state) const;
+    std::optional<FaultState> with_fewer(const FaultState& state) const;
+    bool is_too_much(const FaultState& state, const std::optional<FaultCandidate>& worst) const;
+    std::optional<FaultState> with_more(const FaultState& state, const FaultCandidate& fault) const;
+    std::optional<FoundFaults> revised(const FaultState& state) const;
+    FaultState correct(FaultState state) const;
+    std::optional<FaultState> treat(const FaultState& state, FoundFaults classes) const;
+    FaultState with_left(FaultState state) const;
+    // With these faults instead; none where no minimum is reached.
+    std::optional<FaultState> near(const FaultState& state, const FoundFaults& found) const {
+        SolutionPointer solution = context_.solve_near(found, *state.solution);
+        return solution ? std::optional(FaultState{found, solution}) : std::nullopt;
     }
-    // By falling gain.
-    std::vector<int> order() const {
-        std::vector<int> order;
-        for (int h = 0; h < int(tests->scores().size()); ++h)
-            if (tests->scores()[h].gain > 0.0) order.push_back(h);
-        std::stable_sort(order.begin(), order.end(),
-                         [&](int a, int b) { return tests->scores()[a].gain > tests->scores()[b].gain; });
-        return order;
-    }
-    Candidate candidate(int h) const { return {hypotheses->all()[h], tests->scores()[h]}; }
+
+    const FaultContext& context_;
 };
 
-FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptions& options,
-                         const std::array<double, function_count>& smoothness)
-    : problem_(problem), hypotheses_(problem), options_(options), smoothness_(smoothness) {
-    constexpr double usual_tests = 1000.0;
-    limit_ = options.outlier_probability > 0.0 ? gain_of_probability(options.outlier_probability / usual_tests)
-                                               : thresholds.fault;
-    most_ = std::max(10, int(problem.readings().size() / 50));
+std::optional<FaultState> Search::run() const {
+    const AdjustmentOptions& options = context_.options;
+    const bool corrects = options.outlier_probability > 0.0;
+    const SolutionPointer all = adjust_all();  // 1
+    std::optional<FaultState> state;
+    if (options.search_faults && corrects) state = without_gross(all);  // 2
+    if (!state && all) state = FaultState{{}, all};
+    if (!state || !options.search_faults) return state;
+    if (corrects) state = correct(*state);  // 3 to 9
+    if (corrects && !state->gave_up && state->found.empty()) return state;
+    return with_left(state->gave_up && all ? FaultState{{}, all} : *state);  // 10
 }
 
-FaultSearch::SolutionPointer FaultSearch::run() {
-    const bool corrects = options_.outlier_probability > 0.0;
-    // A second's worth, where nobody will use what comes out.
-    constexpr int least_soon = 40, work = 40'000, rough = 10;
-    const int soon = std::clamp(work / problem_.size(), least_soon, GaussNewton::usual_most_steps);
-    SolutionPointer plain = solution_of(handled()), solution;
-    if (!options_.search_faults) return plain->solve_from_zero(soon) || plain->go_from_zero(rough) ? plain : nullptr;
-    if (!plain->solve_from_zero()) plain.reset();
-    if (corrects && (!plain || plain->scatter() > thresholds.gross_scatter)) solution = without_gross(plain);
-    if (!solution) solution = plain;
-    if (!solution) return nullptr;
-    const bool corrected = corrects && correct(solution);
-    if (corrected && found_.empty()) return solution;
-    last_.reset();
-    if (corrects && !corrected && plain) {
-        // It is not a few readings that do not fit: all stay, and chi-square tells.
-        found_.clear();
-        solution = plain;
-    }
-    left_ = class_of(int(found_.size()), *solution);
-    return solution;
+Search::SolutionPointer Search::adjust_all() const {
+    SolutionPointer all = context_.unsolved({});
+    if (context_.options.search_faults) return all->solve_from_zero() ? all : nullptr;
+    const int soon = std::clamp(work / context_.problem.size(), least_soon, GaussNewton::usual_most_steps);
+    return all->solve_from_zero(soon) || all->go_from_zero(rough) ? all : nullptr;
 }
 
-// --- problems, with what was found in them ---
-
-void FaultSearch::add_fault(std::vector<EstimatedFault>& faults, const Candidate& candidate, PriorUncertainty prior,
-                            int group) const {
-    faults.push_back({hypotheses_.pattern(candidate.hypothesis), prior, std::abs(candidate.score.size), group});
+// None where readings do not scatter so much, or where that helps nothing.
+std::optional<FaultState> Search::without_gross(const SolutionPointer& all) const {
+    if (all && !(all->scatter() > thresholds.gross_scatter)) return std::nullopt;
+    std::optional<FaultState> open = found_linearly(nullptr, all);
+    if (!open) return std::nullopt;
+    if (auto again = found_linearly(open->solution, open->solution)) open = again;
+    FoundFaults told;
+    for (int k = 0; k < int(open->found.size()); ++k)
+        if (const auto found = class_of_one_more(context_, without(open->found, k), *open->solution))
+            told = with(told, found->members.front());
+    const auto next = near(*open, told);
+    return next ? next : open;
 }
 
-AdjustmentProblem FaultSearch::handled(int without, const Candidate* instead) const {
-    AdjustmentProblem problem = problem_;
-    std::vector<EstimatedFault> faults;
-    for (int k = 0; k < int(found_.size()); ++k) {
-        if (k == without) continue;
-        for (const Candidate& member : found_[k].members) {
-            if (member.is_name) continue;
-            if (found_[k].handling == Handling::left_out) {
-                for (const int r : hypotheses_.readings(member.hypothesis)) problem.readings()[r].outlier = k + 1;
-                continue;
-            }
-            const bool known = found_[k].handling == Handling::shared && found_[k].alternatives() > 1;
-            add_fault(faults, member, known ? std::abs(member.score.size) : free_unknown, k);
-            if (found_[k].handling == Handling::representative) break;
-        }
-    }
-    if (instead) add_fault(faults, *instead, free_unknown, int(found_.size()));
-    problem.estimate(std::move(faults));
-    return problem;
-}
-
-FaultSearch::SolutionPointer FaultSearch::solution_of(AdjustmentProblem problem) const {
-    return std::make_shared<Solution>(std::move(problem), smoothness_);
-}
-
-// The unknowns of one problem in another one, with other faults.
-Eigen::VectorXd FaultSearch::carried(const Solution& from, const AdjustmentProblem& to) const {
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(to.size());
-    x.head(problem_.size()) = from.x().head(problem_.size());
-    for (const EstimatedFault& fault : to.faults())
-        for (const EstimatedFault& old : from.problem().faults())
-            if (old.pattern == fault.pattern) x[fault.unknown] = from.x()[old.unknown];
-    return x;
-}
-
-FaultSearch::SolutionPointer FaultSearch::solve_near(const Solution& solution) const {
-    SolutionPointer next = solution_of(handled());
-    if (next->solve_from(carried(solution, next->problem())) || next->solve_from_zero()) return next;
-    return nullptr;
-}
-
-FaultSearch::Tested FaultSearch::test(Solution& solution, const Eigen::VectorXd& x) const {
-    solution.linearise(x);
-    const NormalEquations& equations = solution.solver().equations();
-    Eigen::VectorXd dx = equations.gradient(x);
-    solution.solver().factor().solve(dx);
-    const Eigen::VectorXd residuals = equations.residuals() - equations.image(dx);
-    Tested tested{std::make_unique<FaultHypotheses>(solution.problem()), nullptr,
-                  equations.square_sum(residuals, x + dx), solution.degrees_of_freedom()};
-    tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.inverse(),
-                                                solution.reading_variances(), *tested.hypotheses, residuals);
-    return tested;
-}
-
-const FaultTests& FaultSearch::tests(Solution& solution) {
-    const bool solved_again = options_.smoothness && options_.smoothness->cross_validated;
-    if (!last_ || solved_again) {
-        auto hypotheses = std::make_unique<FaultHypotheses>(solution.problem());
-        auto tests = std::make_unique<FaultTests>(solution.solver().equations(), solution.solver().factor(),
-                                                  solution.inverse(), solution.reading_variances(), *hypotheses);
-        last_ = std::make_shared<Tested>(Tested{std::move(hypotheses), std::move(tests)});
-    }
-    return *last_->tests;
-}
-
-std::optional<FaultSearch::Candidate> FaultSearch::worst(const Tested& tested) const {
-    const std::vector<FaultScore>& scores = tested.tests->scores();
-    const auto best = std::max_element(scores.begin(), scores.end(),
-                                       [](const FaultScore& a, const FaultScore& b) { return a.gain < b.gain; });
-    if (best == scores.end() || !(best->gain >= limit_ * tested.noise_beside(best->gain))) return std::nullopt;
-    return tested.candidate(int(best - scores.begin()));
-}
-
-// --- what there is ---
-
-// On the problem linearised at zero, and then where that leads. What second order leaves counts as scatter: faults are
-// sought as far as they stand out of it.
-FaultSearch::SolutionPointer FaultSearch::without_gross(const SolutionPointer& plain) {
-    SolutionPointer solution;
-    for (int pass = 0; pass < 2; ++pass) {
-        const std::vector<Found> before = std::exchange(found_, {});
-        SolutionPointer next = find_linearly(solution) ? solution_of(handled()) : nullptr;
-        // Where that leaves as much, it is no faults of readings.
-        if (next && !(next->solve_from_zero() && next->scatter() <= thresholds.gross_scatter)) next.reset();
-        if (next && next->square_sum() < (solution ? solution : plain ? plain : next)->square_sum() * 1.01) {
-            solution = next;
-            continue;
-        }
-        found_ = before;
-        if (!solution) return nullptr;
-    }
-    std::vector<Found> told;
-    for (int k = 0; k < int(found_.size()); ++k)
-        if (const auto found = class_of(k, *solution)) told.push_back({{found->members.front()}});
-    std::swap(found_, told);
-    if (SolutionPointer next = solve_near(*solution)) return next;
-    std::swap(found_, told);
-    return solution;
-}
-
-// Each with all that it may be instead, all of them free. False: there are none, or too many.
-bool FaultSearch::find_linearly(const SolutionPointer& where) {
-    const auto tested = [&](int without) {
-        const SolutionPointer at = solution_of(handled(without));
-        Tested result = test(*at, where ? carried(*where, at->problem()) : at->x());
-        result.at = at;
-        return result;
+// On the problem linearised there (none: at zero), each with all that it may be instead, and then where that leads.
+// What second order leaves counts as scatter: faults are sought as far as they stand out of it. None where there are
+// none, or too many, or where more is left than `before`.
+std::optional<FaultState> Search::found_linearly(const SolutionPointer& where, const SolutionPointer& before) const {
+    const auto test = [&](const FoundFaults& found) {
+        return where ? context_.test_near(found, *where) : context_.test(context_.unsolved(found));
     };
+    FoundFaults found;
     while (true) {
-        const Tested rest = tested(-1);
-        const auto next = worst(rest);
+        const TestedFaults rest = test(found);
+        const auto next = context_.worst(rest);
         if (!next) break;
-        if (rest.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
-        found_.push_back({{*next}});
+        if (rest.is_hopeless(next->score.gain, context_.most - int(found.size()))) return std::nullopt;
+        found = with(found, *next);
     }
-    std::vector<Found> open;
-    for (int k = 0; k < int(found_.size()); ++k) {
-        const Tested rest = tested(k);
-        if (!worst(rest)) continue;  // beside the others it is none
+    FoundFaults open;
+    for (int k = 0; k < int(found.size()); ++k) {
+        const TestedFaults rest = test(without(found, k));
+        if (!context_.worst(rest)) continue;  // beside the others it is none
         const std::vector<int> order = rest.order();
-        const double best = rest.tests->scores()[order.front()].gain;
-        Found all{{}, Handling::open};
+        const double best = rest.tests->scores()[order.front()].gain, behind = rest.behind(best);
+        FoundFault all{{}, FaultHandling::open};
         for (const int h : order)
-            if (all.members.size() < most_members &&
-                best - rest.tests->scores()[h].gain < thresholds.alternative * rest.noise_beside(best))
+            if (all.members.size() < most_members && best - rest.tests->scores()[h].gain < behind)
                 all.members.push_back(rest.candidate(h));
         open.push_back(std::move(all));
     }
-    found_ = open;
-    return !found_.empty();
+    if (open.empty()) return std::nullopt;
+    const SolutionPointer next = context_.unsolved(open);
+    // Where that leaves as much, it is no faults of readings.
+    if (!(next->solve_from_zero() && next->scatter() <= thresholds.gross_scatter)) return std::nullopt;
+    if (!(next->square_sum() < (before ? before : next)->square_sum() * same_minimum)) return std::nullopt;
+    return FaultState{open, next};
 }
 
-// Corrects what there is, and says whether it could.
-bool FaultSearch::correct(SolutionPointer& solution) {
-    const int most_rounds = 5 + most_;
-    for (int round = 0; round < most_rounds; ++round) {
-        if (!find_more(solution)) return false;
-        if (found_.empty()) return true;
-        std::vector<Found> classes;
-        std::vector<int> none;  // beside the others
-        for (int k = 0; k < int(found_.size()); ++k) {
-            auto found = class_of(k, *solution);
-            if (found) classes.push_back(std::move(*found));
-            else none.push_back(k);
-        }
-        if (!none.empty()) {
-            const std::vector<Found> before = found_;
-            found_.erase(found_.begin() + none.back());
-            if (SolutionPointer next = solve_near(*solution)) {
-                solution = next;
-                continue;
-            }
-            found_ = before;
-            return true;
-        }
-        const std::vector<Found> single = std::exchange(found_, classes);
-        SolutionPointer treated = solve_treated(*solution);
-        if (!treated) {
-            found_ = single;
-            return true;
-        }
-        const auto left = worst(test(*treated, treated->x()));
-        if (!left || round + 1 == most_rounds || int(found_.size()) == most_) {
-            solution = treated;
-            return true;
-        }
-        found_ = single;
-        found_.push_back({{*left}});
-        SolutionPointer next = solve_near(*solution);
-        if (!next) {
-            found_ = classes;
-            solution = treated;
-            return true;
-        }
-        solution = next;
+FaultState Search::find_more(FaultState state) const {
+    for (int step = 0; step < steps_a_fault * context_.most; ++step) {
+        while (const auto fewer = with_fewer(state)) state = *fewer;                  // 3
+        state.tests = std::make_shared<TestedFaults>(context_.test(state.solution));  // 4
+        const auto worst = context_.worst(*state.tests);
+        if (is_too_much(state, worst)) break;                               // 5
+        const auto more = worst ? with_more(state, *worst) : std::nullopt;  // 6 and 7
+        if (!more) return state;
+        state = *more;
     }
-    return true;
-}
-
-// One after the other, each as one more unknown. False: there are too many.
-bool FaultSearch::find_more(SolutionPointer& solution) {
-    for (int step = 0; step < 4 * most_; ++step) {
-        explain_by_fewer(solution);
-        last_ = std::make_shared<Tested>(test(*solution, solution->x()));
-        const Tested& tested = *last_;
-        const auto next = worst(tested);
-        // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
-        constexpr std::size_t few = 5;
-        if (!next) return found_.size() <= few || tested.noise_beside(0.0) <= thresholds.largest_variance_factor();
-        if (tested.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
-        if (int(found_.size()) == most_) return false;
-        const std::vector<Found> before = found_;
-        found_.push_back({{*next}});
-        SolutionPointer more = solve_near(*solution);
-        if (!more) {
-            const auto found = class_of(int(before.size()), *solution);
-            if (found) found_.back() = {{found->members.front()}};
-            if (found) more = solve_near(*solution);
-        }
-        if (more && drop_or_exchange(*more)) more = solve_near(*more);
-        if (!more) {
-            found_ = before;
-            return true;
-        }
-        solution = more;
-    }
-    return false;
-}
-
-// Beside those that were found later, an earlier one may be none, or another one.
-bool FaultSearch::drop_or_exchange(const Solution& solution) {
-    constexpr std::size_t few = 10;
-    if (found_.size() < 2 || found_.size() > few) return false;
-    bool changed = false;
-    for (int k = 0; k + 1 < int(found_.size()); ++k) {
-        SolutionPointer rest = solution_of(handled(k));
-        const Tested tested = test(*rest, carried(solution, rest->problem()));
-        const auto best = worst(tested);
-        if (!best) {
-            found_.erase(found_.begin() + k--);
-            changed = true;
-            continue;
-        }
-        const FaultHypothesis own = tested.hypotheses->as_tested(found_[k].members.front().hypothesis);
-        double gain = 0.0;
-        for (std::size_t h = 0; h < tested.hypotheses->all().size(); ++h)
-            if (tested.hypotheses->all()[h] == own) gain = tested.tests->scores()[h].gain;
-        if (best->score.gain - gain < thresholds.alternative * tested.noise_beside(best->score.gain)) continue;
-        found_[k] = {{*best}};
-        changed = true;
-    }
-    return changed;
+    state.gave_up = true;
+    return state;
 }
 
 // A tilt's first reading that is wrong, and a slip after it, are the same to first order; what second order makes of
-// the one that did not happen looks like a fault of distances. So each is tried with one fault less.
-void FaultSearch::explain_by_fewer(SolutionPointer& solution) {
-    for (std::size_t k = 0; k < found_.size(); ++k) {
-        const Candidate own = found_[k].members.front();
-        const FaultHypothesis tested = hypotheses_.as_tested(own.hypothesis);
-        if (own.score.gain < thresholds.second_order || !hypotheses_.differs_from_slip(tested)) continue;
-        Candidate other = own;
-        other.hypothesis = own.hypothesis == tested ? *hypotheses_.as_slip(tested) : tested;
+// the one that did not happen looks like a fault of distances.
+std::optional<FaultState> Search::with_fewer(const FaultState& state) const {
+    const FaultHypotheses& hypotheses = context_.hypotheses;
+    const double square_sum = state.solution->square_sum();
+    for (int k = 0; k < int(state.found.size()); ++k) {
+        const FaultCandidate& own = state.found[k].members.front();
+        const FaultHypothesis tested = hypotheses.as_tested(own.hypothesis);
+        if (own.score.gain < thresholds.second_order || !hypotheses.differs_from_slip(tested)) continue;
+        FaultCandidate other = own;
+        other.hypothesis = own.hypothesis == tested ? *hypotheses.as_slip(tested) : tested;
         other.score.size = -own.score.size;
-        for (std::size_t j = 0; j < found_.size(); ++j) {
+        FoundFaults exchanged = state.found;
+        exchanged[k] = {{other}};
+        for (int j = 0; j < int(state.found.size()); ++j) {
             if (j == k) continue;
-            const std::vector<Found> before = found_;
-            found_[k] = {{other}};
-            found_.erase(found_.begin() + int(j));
-            SolutionPointer next = solve_near(*solution);
-            const double enough = limit_ * noise(solution->square_sum(), solution->degrees_of_freedom());
-            if (next && next->square_sum() < solution->square_sum() + enough) {
-                solution = next;
-                return explain_by_fewer(solution);
-            }
-            found_ = before;
+            auto next = near(state, without(exchanged, j));
+            const double enough = context_.limit * scatter_factor(square_sum, state.solution->degrees_of_freedom());
+            if (next && next->solution->square_sum() < square_sum + enough) return next;
         }
     }
+    return std::nullopt;
 }
 
-// Beside a tilt's first reading that may be wrong the slip that second order may tell from it.
-void FaultSearch::add_slips(std::vector<Candidate>& candidates) const {
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-        if (!hypotheses_.differs_from_slip(candidates[i].hypothesis)) continue;
-        Candidate slip{*hypotheses_.as_slip(candidates[i].hypothesis), candidates[i].score};
-        slip.score.size = -slip.score.size;
-        candidates.insert(candidates.begin() + int(++i), slip);
-    }
+// A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
+bool Search::is_too_much(const FaultState& state, const std::optional<FaultCandidate>& worst) const {
+    const TestedFaults& tests = *state.tests;
+    const int found = int(state.found.size());
+    if (!worst) return found > few && !(tests.noise_beside(0.0) <= thresholds.largest_variance_factor());
+    return tests.is_hopeless(worst->score.gain, context_.most - found) || found == context_.most;
 }
 
-// Beside a first reading that may be wrong the slip that it may be named as, where nothing tells them apart.
-void FaultSearch::add_names(std::vector<Candidate>& members, bool large) const {
-    for (std::size_t i = 0; i < members.size(); ++i) {
-        const auto slip = hypotheses_.as_slip(members[i].hypothesis);
-        if (!slip || (large && hypotheses_.differs_from_slip(members[i].hypothesis))) continue;
-        Candidate name{*slip, members[i].score, true};
-        name.score.size = -name.score.size;
-        members.insert(members.begin() + int(++i), name);
-    }
+std::optional<FaultState> Search::with_more(const FaultState& state, const FaultCandidate& fault) const {
+    std::optional<FaultState> more = near(state, with(state.found, fault));
+    if (!more)
+        if (const auto found = class_of_one_more(context_, state.found, *state.solution))
+            more = near(state, with(state.found, found->members.front()));
+    const auto found = more ? revised(*more) : std::nullopt;
+    return found ? near(*more, *found) : more;
 }
 
-// The class of a fault, were it the only one that is not known: on the problem linearised at the solution, and by exact
-// adjustments where it is so large that second order may tell.
-std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Solution& solution) const {
-    constexpr double second_order = 0.02;  // of a large gain
-    SolutionPointer rest = solution_of(handled(number));
-    const Tested tested = test(*rest, carried(solution, rest->problem()));
-    if (!worst(tested)) return std::nullopt;
-    const std::vector<int> order = tested.order();
-    const double best = tested.tests->scores()[order.front()].gain;
-    const double behind = thresholds.alternative * tested.noise_beside(best);
-    std::vector<Candidate> members;
-    for (const int h : order) {
-        const double less = best - tested.tests->scores()[h].gain;
-        const bool may_be =
-            best > thresholds.second_order && members.size() < most_exact && less < behind + second_order * best;
-        if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
+// Beside those that were found later, an earlier one may be none, or another one. None where all stay.
+std::optional<FoundFaults> Search::revised(const FaultState& state) const {
+    FoundFaults found = state.found;
+    if (found.size() < 2 || found.size() > most_revised) return std::nullopt;
+    bool changed = false;
+    for (int k = 0; k + 1 < int(found.size());) {
+        const TestedFaults tested = context_.test_near(without(found, k), *state.solution);
+        const auto best = context_.worst(tested);
+        if (!best) {
+            found = without(found, k);
+            changed = true;
+            continue;
+        }
+        const FaultHypothesis own = tested.hypotheses->as_tested(found[k].members.front().hypothesis);
+        if (!(best->score.gain - tested.gain_of(own) < tested.behind(best->score.gain))) {
+            found[k] = {{*best}};
+            changed = true;
+        }
+        ++k;
     }
-    if (best > thresholds.second_order && tested.noise_beside(best) <= thresholds.largest_variance_factor()) {
-        add_slips(members);
-        adjust_exactly(members, number, solution);
-        const std::vector<Candidate> twins = with_twins(members, tested);
-        if (is_told_by_leaving_out(twins, tested)) members = twins;
-    }
-    Found found{members, is_told_by_leaving_out(members, tested) ? Handling::left_out : Handling::shared};
-    add_names(found.members, best > thresholds.second_order);
-    return found;
+    return changed ? std::optional(found) : std::nullopt;
 }
 
-void FaultSearch::adjust_exactly(std::vector<Candidate>& candidates, int number, const Solution& solution) const {
-    const double best = candidates.front().score.gain;
-    double least = infinity, gain_of_least = best;
-    int freedom = 0;
-    std::vector<double> square_sum;
-    for (std::size_t i = 0; i < candidates.size() && i < most_exact; ++i) {
-        SolutionPointer with = solution_of(handled(number, &candidates[i]));
-        square_sum.push_back(infinity);
-        if (!with->solve_from(carried(solution, with->problem()))) continue;
-        square_sum.back() = with->square_sum();
-        candidates[i].score.size = with->x()[with->problem().faults().back().unknown];
-        if (square_sum.back() >= least) continue;
-        least = square_sum.back();
-        gain_of_least = candidates[i].score.gain;
-        freedom = with->degrees_of_freedom();
+FaultState Search::correct(FaultState state) const {
+    const int most_rounds = rounds_more + context_.most;
+    for (int round = 0; round < most_rounds; ++round) {
+        state = find_more(state);  // 3 to 7
+        if (state.gave_up || state.found.empty()) return state;
+        FoundFaults classes;  // 8
+        std::optional<int> none;
+        for (int k = 0; k < int(state.found.size()); ++k) {
+            const auto found = class_of_one_more(context_, without(state.found, k), *state.solution);
+            if (found) classes.push_back(*found);
+            else none = k;
+        }
+        if (none) {
+            const auto next = near(state, without(state.found, *none));
+            if (!next) return state;
+            state = *next;
+            continue;
+        }
+        const auto treated = treat(state, classes);  // 9
+        if (!treated) return state;
+        const auto left = context_.worst(context_.test(treated->solution));
+        if (!left || round + 1 == most_rounds || int(classes.size()) == context_.most) return *treated;
+        const auto next = near(state, with(state.found, *left));
+        if (!next) return {classes, treated->solution};  // said as they were to be treated, not as open
+        state = *next;
     }
-    if (least == infinity) return;
-    const double behind = thresholds.alternative * noise(least, freedom);
-    for (std::size_t i = 0; i < square_sum.size(); ++i)
-        candidates[i].score.gain = gain_of_least + least - square_sum[i];
-    candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
-                                    [&](const Candidate& c) { return !(gain_of_least - c.score.gain < behind); }),
-                     candidates.end());
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.score.gain > b.score.gain; });
+    return state;
 }
 
-// Where second order tells the large fault of a reading from those of its twins, no reading controls these any more.
-std::vector<FaultSearch::Candidate> FaultSearch::with_twins(std::vector<Candidate> members,
-                                                            const Tested& tested) const {
-    const auto& all = tested.hypotheses->all();
-    const auto best = std::find(all.begin(), all.end(), members.front().hypothesis);
-    if (best == all.end() || best->kind != FaultKind::reading) return members;
-    const std::vector<double> correlation = tested.tests->correlations(int(best - all.begin()));
-    for (std::size_t h = 0; h < all.size(); ++h) {
-        const auto is_this = [&](const Candidate& member) { return member.hypothesis == all[h]; };
-        if (all[h].kind != FaultKind::reading || std::abs(correlation[h]) < twin) continue;
-        if (std::none_of(members.begin(), members.end(), is_this)) members.push_back(tested.candidate(int(h)));
-    }
-    return members;
-}
-
-// Readings that show the same in all others: without them nothing is left of the fault. One of the two of a scale line
-// takes the other with it.
-bool FaultSearch::is_told_by_leaving_out(const std::vector<Candidate>& members, const Tested& tested) const {
-    std::vector<int> number;
-    for (const Candidate& member : members) {
-        if (member.hypothesis.kind != FaultKind::reading) return false;
-        if (hypotheses_.sequences()[member.hypothesis.sequence].readings.size() < 3) return false;
-        const auto& all = tested.hypotheses->all();
-        number.push_back(int(std::find(all.begin(), all.end(), member.hypothesis) - all.begin()));
-    }
-    for (std::size_t i = 0; i + 1 < number.size(); ++i) {
-        const std::vector<double> correlation = tested.tests->correlations(number[i]);
-        for (std::size_t j = i + 1; j < number.size(); ++j)
-            if (std::abs(correlation[number[j]]) < twin) return false;
-    }
-    return true;
-}
-
-FaultSearch::SolutionPointer FaultSearch::solve_treated(const Solution& solution) {
-    // With one of each class as a free unknown it was this; as one of several known to be about as large it costs 1.
-    const double expected = 1.01 * solution.square_sum() + 2.0 * double(found_.size());
-    const auto solve = [&]() -> SolutionPointer {
+std::optional<FaultState> Search::treat(const FaultState& state, FoundFaults classes) const {
+    const Solution& before = *state.solution;
+    const double expected = same_minimum * before.square_sum() + treated_cost * double(classes.size());
+    const auto solve = [&]() -> std::optional<FaultState> {
         // From zero where that leads as far: as if the readings left out had been lost.
         for (const bool from_zero : {true, false}) {
-            SolutionPointer next = solution_of(handled());
-            if ((from_zero ? next->solve_from_zero() : next->solve_from(carried(solution, next->problem()))) &&
-                next->square_sum() <= expected)
-                return next;
+            const SolutionPointer next = context_.unsolved(classes);
+            const bool solved =
+                from_zero ? next->solve_from_zero() : next->solve_from(context_.carried(before, next->problem()));
+            if (solved && next->square_sum() <= expected) return FaultState{classes, next};
         }
-        return nullptr;
+        return std::nullopt;
     };
-    if (SolutionPointer next = solve()) return next;
+    if (const auto next = solve()) return next;
     // Gross alternatives that no one solution stands between: all of them are free then.
-    for (Found& found : found_)
-        if (found.handling == Handling::shared) found.handling = Handling::open;
+    for (FoundFault& found : classes)
+        if (found.handling == FaultHandling::shared) found.handling = FaultHandling::open;
     return solve();
 }
 
-// --- what is said ---
-
-namespace {
-
-// Each value of a calibration, with the parameter and the limit of what is plausible.
-struct Value {
-    const LinearForm* form;
-    std::string parameter;
-    double limit;
-};
-
-std::vector<Value> values_of(const CalibratedForms& forms, const Plan& plan, const PlausibleLimits& limits) {
-    std::vector<Value> values;
-    for (int i = 0; i < function_count; ++i) {
-        if (!forms.functions[i]) continue;
-        const FunctionId id = FunctionId::at(i);
-        double limit = id.is_rotation() ? limits.rotation : limits.translation;
-        if (id.is_positioning()) limit = std::min(limit, limits.positioning * plan.volume()[index(id.axis)]);
-        for (const LinearForm& form : forms.functions[i]->value) values.push_back({&form, id.name(), limit});
-    }
-    for (const Squareness s : all_squarenesses)
-        if (const auto& form = forms.squarenesses[static_cast<int>(s)])
-            values.push_back({&*form, name(s), limits.rotation});
-    return values;
+FaultState Search::with_left(FaultState state) const {
+    state.tests.reset();
+    state.left = class_of_one_more(context_, state.found, *state.solution);
+    return state;
 }
 
 }  // namespace
 
-std::vector<FaultClass> FaultSearch::classes(const Solution& solution, const CalibratedForms& forms,
-                                             const Measurement& measurement) const {
-    std::vector<FaultClass> classes;
-    const auto add = [&](const Found& found, FaultTreatment treatment) -> FaultClass& {
-        FaultClass entry{{}, treatment};
-        for (const Candidate& member : found.members) {
-            const AdjustedReading& reading = problem_.readings()[*hypotheses_.readings(member.hypothesis).begin()];
-            const Station& station = measurement.stations()[reading.row];
-            entry.members.push_back({member.hypothesis.kind, reading.row, station.run, station.line.name(),
-                                     station.point, problem_.channel_name(reading), member.score.size,
-                                     member.score.standard_uncertainty, member.score.gain});
-        }
-        return classes.emplace_back(std::move(entry));
-    };
-    const std::vector<Value> values = values_of(forms, problem_.plan(), options_.plausible);
-    for (int k = 0; k < int(found_.size()); ++k) {
-        const Found& found = found_[k];
-        const bool left_out = found.handling == Handling::left_out;
-        FaultClass& entry = add(found, left_out ? FaultTreatment::left_out : FaultTreatment::estimated);
-        entry.corrected = options_.slips == Slips::estimate ||
-                          std::any_of(found.members.begin(), found.members.end(), [](const Candidate& member) {
-                              return member.hypothesis.kind == FaultKind::reading;
-                          });
-        if (left_out || found.alternatives() < 2) continue;
-        const SolutionPointer rest = solution_of(handled(k));
-        const Tested tested = test(*rest, carried(solution, rest->problem()));
-        std::vector<Eigen::VectorXd> effects;  // of what each has done
-        for (const Candidate& member : found.members)
-            if (!member.is_name) effects.push_back(member.score.size * tested.tests->effect(member.hypothesis));
-        for (const Value& value : values) {
-            double low = infinity, high = -infinity;
-            for (const Eigen::VectorXd& effect : effects) {
-                low = std::min(low, value.form->value(effect));
-                high = std::max(high, value.form->value(effect));
-            }
-            if (entry.widest.empty() || (high - low) / value.limit > entry.spread / entry.plausible) {
-                entry.widest = value.parameter;
-                entry.spread = high - low;
-                entry.plausible = value.limit;
-            }
-        }
-    }
-    // Several slips that are not told apart may be other pairs than these: no class says so.
-    const auto is_doubtful = [](const FaultClass& entry) {
-        return !entry.told_apart() && std::none_of(entry.members.begin(), entry.members.end(),
-                                                   [](const Fault& fault) { return fault.kind == FaultKind::reading; });
-    };
-    if (std::count_if(classes.begin(), classes.end(), is_doubtful) > 1)
-        for (FaultClass& entry : classes)
-            if (is_doubtful(entry)) entry.corrected = false;
-    if (left_) add(*left_, FaultTreatment::none);
-    return classes;
+std::optional<FaultState> search_faults(const FaultContext& context) { return Search(context).run(); }
+
+std::shared_ptr<const TestedFaults> tests_now(const FaultContext& context, const FaultState& state) {
+    const bool solved_again = context.options.smoothness && context.options.smoothness->cross_validated;
+    if (state.tests && !solved_again) return state.tests;
+    Solution& solution = *state.solution;
+    TestedFaults tested{state.solution, std::make_unique<FaultHypotheses>(solution.problem())};
+    tested.tests = std::make_unique<FaultTests>(solution.solver().equations(), solution.solver().factor(),
+                                                solution.inverse(), solution.reading_variances(), *tested.hypotheses);
+    return std::make_shared<TestedFaults>(std::move(tested));
 }
 
 }  // namespace stepdiag

@@ -1,102 +1,38 @@
 // The search for faults of the readings, and what is done about them. Internal: not installed.
-// Faults are found one after the other, each as one more free unknown: the one that takes most off chi-square, as long
-// as that is significant; what is no longer significant beside the others is dropped. Then each gets its class: all
-// hypotheses whose gain is less than 25 behind that of the best, by exact adjustments of the best 20. The classes are
-// treated (FaultTreatment), everything is adjusted anew, and tested again.
-// Where Gauss-Newton fails, or settles where readings scatter far too much, the search begins on the problem
-// linearised at zero, which has one minimum whatever the readings are; there and then all of a class are free, so that
-// no gross value is left in the problem. What it takes is that a fault is controlled: N faults of which each is seen
-// beside the others need as many redundant directions. The standard plan has one a step among the distances of the body
-// diagonals, five among the tilts, and one among the scale lines.
+//  1. Adjust all readings.
+//  2. Where that fails, or readings scatter far too much, find gross faults on the problem linearised at zero, and once
+//     more where that leads. It has one minimum whatever the readings are; all of each class are free there.
+//  3. Try each large fault as what second order may tell from it, with one of the other faults less.
+//  4. Test all hypotheses. The worst is the one that takes most off chi-square, as long as that is significant.
+//  5. Give up where there are too many, or where as many more as there may be leave a scatter that nobody believes.
+//  6. Adjust with the worst as one more free unknown, or with the best of its class where that fails.
+//  7. Drop what is none beside the others, exchange what another one explains better; from 3 until no worst is left.
+//  8. Find the class of each (fault_class.hpp). One that is not significant beside the others is dropped: back to 3.
+//  9. Treat the classes (FaultTreatment), adjust, test. What is significant then is one more fault: back to 3.
+// 10. Where it gave up, all readings stay. What is still significant gets its class, and nothing is done about it.
+// What it takes is that a fault is controlled: N faults of which each is seen beside the others need as many redundant
+// directions. The standard plan has one a step among the distances of the body diagonals, five among the tilts, and one
+// among the scale lines.
 #pragma once
 
-#include <Eigen/Core>
-#include <algorithm>
-#include <array>
 #include <memory>
 #include <optional>
-#include <vector>
 
-#include "adjustment/adjustment_result.hpp"
-#include "adjustment/solution.hpp"
-#include "diagnosis/fault_tests.hpp"
+#include "diagnosis/found_faults.hpp"
 
 namespace stepdiag {
 
-class FaultSearch {
-public:
-    // `smoothness`: as of GaussNewton.
-    FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptions& options,
-                const std::array<double, function_count>& smoothness);
-
-    // The adjustment with what was done about the faults; none where no minimum is reached.
-    std::shared_ptr<Solution> run();
-    // What was found by then. `forms`: of which alternatives are compared.
-    std::vector<FaultClass> classes(const Solution& solution, const CalibratedForms& forms,
-                                    const Measurement& measurement) const;
-
-    // At the adjustment that came out, as it is now.
-    const FaultTests& tests(Solution& solution);
-
-private:
-    struct Candidate {
-        FaultHypothesis hypothesis;
-        FaultScore score;
-        bool is_name = false;  // another one of the member before, and nothing of its own
-    };
-    // How the members of a class are taken while the search goes on.
-    enum class Handling {
-        representative,  // the first is a free unknown
-        open,            // all are
-        left_out,        // all their readings are
-        shared           // all are unknowns with priors
-    };
-    struct Found {
-        std::vector<Candidate> members;  // the best first
-        Handling handling = Handling::representative;
-
-        auto alternatives() const {
-            return std::count_if(members.begin(), members.end(), [](const Candidate& c) { return !c.is_name; });
-        }
-    };
-    // The tests on the problem linearised somewhere, at its minimum there.
-    struct Tested;
-    using SolutionPointer = std::shared_ptr<Solution>;
-
-    // With what was found, but for one class, or with a fault in its place.
-    AdjustmentProblem handled(int without = -1, const Candidate* instead = nullptr) const;
-    void add_fault(std::vector<EstimatedFault>& faults, const Candidate& candidate, PriorUncertainty prior,
-                   int group) const;
-    SolutionPointer solution_of(AdjustmentProblem problem) const;
-    SolutionPointer solve_near(const Solution& solution) const;  // none where it fails
-    SolutionPointer solve_treated(const Solution& solution);     // likewise
-    Eigen::VectorXd carried(const Solution& from, const AdjustmentProblem& to) const;
-    Tested test(Solution& solution, const Eigen::VectorXd& x) const;
-    std::optional<Candidate> worst(const Tested& tested) const;  // if it is significant
-
-    SolutionPointer without_gross(const SolutionPointer& plain);  // none where that helps nothing
-    bool find_linearly(const SolutionPointer& where);             // at zero where there is no solution yet
-    bool correct(SolutionPointer& solution);
-    bool find_more(SolutionPointer& solution);
-    bool drop_or_exchange(const Solution& solution);
-    void explain_by_fewer(SolutionPointer& solution);
-    void add_slips(std::vector<Candidate>& candidates) const;
-    void add_names(std::vector<Candidate>& members, bool large) const;
-    // None where that is not significant.
-    std::optional<Found> class_of(int number, const Solution& solution) const;
-    void adjust_exactly(std::vector<Candidate>& candidates, int number, const Solution& solution) const;
-    std::vector<Candidate> with_twins(std::vector<Candidate> members, const Tested& tested) const;
-    bool is_told_by_leaving_out(const std::vector<Candidate>& members, const Tested& tested) const;
-
-    AdjustmentProblem problem_;
-    FaultHypotheses hypotheses_;  // of all readings: their sequences
-    AdjustmentOptions options_;
-    std::array<double, function_count> smoothness_;
-    double limit_;
-    int most_;
-    std::vector<Found> found_;
-    std::optional<Found> left_;     // what was found and nothing was done about
-    std::shared_ptr<Tested> last_;  // of a run without faults
+struct FaultState {
+    FoundFaults found;
+    std::shared_ptr<Solution> solution;              // with them
+    std::shared_ptr<const TestedFaults> tests = {};  // at the solution, where they were made
+    bool gave_up = false;                            // it is not a few readings that do not fit
+    std::optional<FoundFault> left = std::nullopt;   // what is still significant, and nothing was done about
 };
+
+// The adjustment with what was done about the faults; none where no minimum is reached.
+std::optional<FaultState> search_faults(const FaultContext& context);
+// The tests at the adjustment that came out, as it is now: another smoothness may have been found since.
+std::shared_ptr<const TestedFaults> tests_now(const FaultContext& context, const FaultState& state);
 
 }  // namespace stepdiag
