@@ -6,7 +6,6 @@
 #include <set>
 #include <tuple>
 
-#include "adjustment/rounding.hpp"
 #include "adjustment/setup_priors.hpp"
 #include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"

@@ -1,10 +1,10 @@
 #include "adjustment/gauss_newton.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "adjustment/rank_decision.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -13,6 +13,20 @@ namespace {
 // Where angles have changed by less (rad, and lengths by less of a metre) since the factor was made, it serves: for
 // steps, which with it still shrink by a factor of 1e4 or so, and for uncertainties, to 1e-6 of them.
 constexpr double steps_hold = 1e-7, uncertainties_hold = 3e-10;
+
+// Rank is decided on the normal equations at zero, columns scaled to 1: a pivot at or below this counts as 0. It is the
+// square of a singular value: directions known 3e5 times worse than the best ones still count as determined.
+constexpr double rank_threshold = 1e-11;
+
+// One unknown for each dimension that the readings leave open: those that the factor of the normal equations at zero
+// has held because they depend on the others. (The band has places without an unknown, which are held too.)
+std::vector<int> dependent_unknowns(const AdjustmentProblem& problem, const BorderedFactor& factor) {
+    std::vector<int> dependent;
+    for (const int j : factor.held())
+        if (j >= 6 * problem.blocks() || j % 6 < 3 || problem.has_rotations()) dependent.push_back(j);
+    return dependent;
+}
+
 }  // namespace
 
 GaussNewton::GaussNewton(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness)
@@ -209,6 +223,44 @@ double GaussNewton::least_on_the_way(int most_steps) {
 int GaussNewton::solve(Eigen::VectorXd& x) {
     if (const auto count = try_solve(x)) return *count;
     throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
+}
+
+// What is open is assumed to be at 0 first, and then, because that pulls at what is determined by its square, where
+// it came out.
+std::optional<int> solve_from_zero(GaussNewton& solver, const std::vector<bool>& determined, Eigen::VectorXd& x,
+                                   int most_steps) {
+    // The second order of what is open may lead astray: then once more from zero with the open unknowns held, and
+    // whichever fits best.
+    constexpr double parts[] = {1.0, 1e-4};
+    constexpr double good_fit = 4.0;
+    const double readings = double(solver.equations().problem().readings().size());
+    std::optional<int> count;
+    double least = std::numeric_limits<double>::infinity();
+    double best = parts[0];
+    for (const double part : parts) {
+        Eigen::VectorXd solution = Eigen::VectorXd::Zero(x.size());
+        solver.equations().assume_usual(determined, solution, part);
+        const std::optional<int> steps = solver.try_solve(solution, most_steps);
+        const double square_sum = solver.equations().square_sum(solution);
+        if (steps && square_sum < least) {
+            count = steps;
+            x = solution;
+            least = square_sum;
+            best = part;
+        }
+        if (solver.dependent().empty() || (count && least < good_fit * readings)) break;
+    }
+    if (!count || solver.dependent().empty() || best < 1.0) return count;
+    Eigen::VectorXd again = x;
+    solver.equations().assume_usual(determined, x);
+    const std::optional<int> more = solver.try_solve(again, most_steps);
+    // Once more may lead astray, too.
+    if (!more || solver.equations().square_sum(again) > 1.01 * std::max(least, readings)) {
+        solver.equations().assume_usual(determined, Eigen::VectorXd::Zero(x.size()));
+        return count;
+    }
+    x = again;
+    return *count + *more;
 }
 
 }  // namespace stepdiag

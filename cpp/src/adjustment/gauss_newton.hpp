@@ -1,4 +1,5 @@
-// Gauss-Newton on the adjustment's normal equations, and what they leave open. Internal: not installed.
+// Gauss-Newton on the adjustment's normal equations, and what they leave open, from a place that is near or without any
+// knowledge of where the solution is. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>
@@ -68,5 +69,11 @@ private:
     double rounding_ = 0.0;  // of the square sum: what the rounding of readings and models adds to it
     bool fresh_ = true;      // derivatives and factor are those at zero, from the beginning
 };
+
+// From zero to the minimum: the number of steps, or none where no minimum is reached. `determined`: the unknowns that
+// the readings determine; the others are assumed to be usual, in the end where they came out. Several paths are tried
+// where the first ends at a square sum that no sound run has; the least minimum counts.
+std::optional<int> solve_from_zero(GaussNewton& solver, const std::vector<bool>& determined, Eigen::VectorXd& x,
+                                   int most_steps = GaussNewton::usual_most_steps);
 
 }  // namespace stepdiag

@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "adjustment/adjustment_result.hpp"
-#include "adjustment/solve_from_zero.hpp"
+#include "adjustment/smoothness.hpp"
+#include "stepdiag/adjustment/fit_quality.hpp"
 
 namespace stepdiag {
 Solution::Solution(AdjustmentProblem problem, const std::array<double, function_count>& smoothness)
@@ -82,5 +83,17 @@ const Eigen::VectorXd& Solution::reading_variances() {
 }
 
 int Solution::degrees_of_freedom() const { return stepdiag::degrees_of_freedom(solver_); }
+
+std::optional<FitQuality> fit_quality(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                                      const Eigen::Vector3d& tool, const HeadCalibrations& heads,
+                                      const AdjustmentOptions& options, int most_steps) {
+    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
+    if (problem.readings().empty()) return std::nullopt;
+    GaussNewton solver(problem, smoothness_at_start(options));
+    solver.assume_usual(std::vector<bool>(std::size_t(problem.size()), false));
+    const double square_sum = solver.least_on_the_way(most_steps);
+    if (!std::isfinite(square_sum)) return std::nullopt;
+    return FitQuality{square_sum, degrees_of_freedom(solver)};
+}
 
 }  // namespace stepdiag

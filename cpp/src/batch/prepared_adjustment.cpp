@@ -1,6 +1,6 @@
 #include "batch/prepared_adjustment.hpp"
 
-#include "adjustment/solve_from_zero.hpp"
+#include "adjustment/gauss_newton.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "adjustment/solve_from_zero.hpp"
+#include "adjustment/gauss_newton.hpp"
 
 namespace stepdiag {
 namespace {

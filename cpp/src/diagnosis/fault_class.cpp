@@ -115,7 +115,7 @@ std::optional<FoundFault> class_of_one_more(const FaultContext& context, const F
     Candidates members;
     for (const int h : order) {
         const double less = best - tested.tests->scores()[h].gain;
-        const bool may_be = large && members.size() < most_exact && less < behind + second_order * best;
+        const bool may_be = large && members.size() < most_exact && less < behind + second_order_part * best;
         if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
     }
     if (large && tested.noise_beside(best) <= thresholds.largest_variance_factor()) {

@@ -18,7 +18,7 @@ namespace stepdiag {
 
 // What the search decides by beside `thresholds`: work that is worth it, and what second order leaves uncertain.
 namespace search_limits {
-// A probability of an outlier (AdjustmentOptions) is that of a run, with about so many tests.
+// The outlier probability (AdjustmentOptions) is of a false alarm among so many tests: those of a run of 20 steps.
 inline constexpr double usual_tests = 1000.0;
 // Faults of a channel on the way, beside those that it may have: several readings may turn out to be one slip.
 inline constexpr int more_on_the_way = 5;
@@ -32,10 +32,10 @@ inline constexpr int few = 5;
 inline constexpr std::size_t most_revised = 10;
 // Correlation of faults that show the same in all other readings.
 inline constexpr double twin = 0.99;
-// What second order may make of a large gain: so near to the best a fault is adjusted exactly.
-inline constexpr double second_order = 0.02;
+// The part of a large gain that second order may make: what is as near to the best is adjusted exactly.
+inline constexpr double second_order_part = 0.02;
 inline constexpr std::size_t most_exact = 20;    // exact adjustments of a class
-inline constexpr std::size_t most_members = 40;  // of a class: nobody reads more
+inline constexpr std::size_t most_members = 40;  // of a class: they are near enough to what is behind them
 // Two minima with square sums as near as this are the same, to what second order leaves.
 inline constexpr double same_minimum = 1.01;
 // What a fault costs as one of several known to be about as large, in place of a free one: 1, and a margin.

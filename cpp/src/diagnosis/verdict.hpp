@@ -11,7 +11,7 @@ namespace stepdiag {
 std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
                                         const std::vector<DriftEstimate>& machine_drift);
 
-// `residual_rounding`: rms of the residuals, each in units of its rounding (adjustment/rounding.hpp).
+// `residual_rounding`: rms of the residuals, each in units of its rounding (adjustment/channel_model.hpp).
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
               const std::vector<ResidualPattern>& prior_scatter, double residual_rounding);
 
