@@ -109,10 +109,10 @@ void bind_volume_errors(py::module_& m) {
              "calibration without covariance.")
         .def_static(
             "names", [] { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
-            "Columns of draw.")
+            "Columns of draw, without the last two.")
         .def_property_readonly(
             "values", [](const VolumeDraws& draws) { return to_numpy_vector(draws.values()); },
-            "(15,) figures of the calibration's own values.")
+            "(17,) as a draw, of the calibration's own values, of which nothing is drawn.")
         .def(
             "draw",
             [](const VolumeDraws& draws, const IntegerLike& first, const IntegerLike& count) {
@@ -124,7 +124,9 @@ void bind_volume_errors(py::module_& m) {
                 return to_numpy(figures);
             },
             py::arg("first"), py::arg("count"),
-            "(count, 15) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads.");
+            "(count, 17) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads. The "
+            "last two columns are of the place of the draw's largest error and along that error, mm: how much of it "
+            "was drawn, and the standard uncertainty of the calibration's error there.");
 }
 
 }  // namespace stepdiag::bindings

@@ -1,5 +1,8 @@
 #include "uncertainty/volume_field.hpp"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+
 namespace stepdiag {
 
 using Eigen::ArrayXd;
@@ -80,6 +83,36 @@ void VolumeGrid::field(const double* table, VolumeField& f) const {
         }
         if (r == 1) slopes(at, 2, f.g23);
     }
+}
+
+Eigen::Vector3d VolumeGrid::error(const VolumeField& f, const GridPlace& place) const {
+    const auto [i, j, k] = place;
+    const double p2 = position_[1][j], p3 = position_[2][k];
+    Eigen::Vector3d e;
+    for (std::size_t c = 0; c < 3; ++c)
+        e[Index(c)] = f.own[0][c][i] + f.own[1][c][j] + f.own[2][c][k] + f.g12[c][i] * p2 +
+                      (f.g13[c][i] + f.g23[c][j]) * p3;
+    return e;
+}
+
+double VolumeGrid::variance(const MatrixXd& covariance, const GridPlace& place, const Eigen::Vector3d& along) const {
+    std::array<Index, 18> entry;
+    Eigen::Matrix<double, 18, 1> weight;
+    Eigen::Vector3d lever = tool_;  // of the rotations of an axis: from it to the functional point
+    Index after = Index(rows_.size());
+    for (std::size_t r = 3; r-- > 0;) {
+        Eigen::Vector3d own = Eigen::Vector3d::Zero();
+        own[index(order_[r])] = position_[r][place[r]];
+        const Eigen::Vector3d turned = (carries_workpiece_[r] ? Eigen::Vector3d(lever + own) : lever).cross(along);
+        lever += own;
+        const Index n = position_[r].size();
+        after -= 6 * n;
+        for (Index c = 0; c < 6; ++c) {
+            entry[6 * r + std::size_t(c)] = after + c * n + place[r];
+            weight[Index(6 * r) + c] = c < 3 ? along[c] : turned[c - 3];
+        }
+    }
+    return std::max(weight.dot(covariance(entry, entry) * weight), 0.0);
 }
 
 }  // namespace stepdiag

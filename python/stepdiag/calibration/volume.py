@@ -63,6 +63,16 @@ class VolumeFigure:
     interval: Interval | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class ChosenPlaces:
+    """What the bounds of the largest error rest on: draws add noise to the values of a calibration, and each chooses
+    the place and the direction of its largest error. Lengths in mm."""
+
+    found: FloatArray  # (n,) the calibration's error there, along that direction; the first: its own largest error
+    u: FloatArray  # (n,) its standard uncertainty, without between_nodes
+    judged: float  # mean over the draws of `found` less the noise that chose; on average at most the true largest error
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class VolumeErrors(Displayed):
     """Errors of the functional point and tilts of the tool over a box of commanded positions."""
@@ -75,8 +85,8 @@ class VolumeErrors(Displayed):
     largest: float  # mm; NaN where a parameter that acts in it is not determined, as all figures
     largest_at: FloatArray  # (3,) commanded, mm
     largest_components: FloatArray  # (3,) dx, dy, dz, mm
-    largest_spread: Spread | None  # its bias and standard uncertainty without between_nodes, mm
-    largest_interval: Interval | None  # 95 %, with between_nodes; None without a covariance, as all intervals
+    largest_chosen: ChosenPlaces | None  # None without a covariance, and where the largest error is not known
+    largest_interval: Interval | None  # 95 % or more, with between_nodes; None without a covariance, as all intervals
     rms: float  # root of the mean of |e|^2 over the box, mm
     rms_interval: Interval | None
     ranges: Mapping[str, VolumeFigure]  # "X", "Y", "Z": largest minus smallest component, mm
@@ -86,7 +96,7 @@ class VolumeErrors(Displayed):
     missing: Mapping[str, tuple[str, ...]]  # "X" ... "C" -> parameters that act in it and are not determined
     between_nodes: float  # standard uncertainty of the largest error by what lies between the nodes, mm
     between_nodes_estimated: bool  # from second differences of the tables; else it was stated
-    bounds: Interval | None  # of the largest error, mm: it is above the first, and below the second, with 95 % each
+    bounds: Interval | None  # of the largest error, mm: above the first, below the second, with 95 % or more each
     limit: float | None  # mm
     verdict: Verdict | None  # None without a limit, without a covariance, or where the largest error is not known
     no_verdict_because: str  # why there is none although there is a limit; else empty
@@ -100,11 +110,22 @@ class VolumeErrors(Displayed):
         x, y, z = (len(positions) for positions in self.grid)
         return x, y, z
 
+    @property
+    def interval_note(self) -> str:
+        """Why there is a verdict although the limit is in `largest_interval`; else empty."""
+        if self.limit is None or self.verdict in (None, "undecided") or self.largest_interval is None:
+            return ""
+        low, high = self.largest_interval
+        if not low <= self.limit <= high:
+            return ""
+        return "the limit is in the 95 % interval: that leaves 2.5 % on each side, the verdict 5 % on one"
+
     def _facts(self) -> Facts:
         low, high = self.largest_interval or (float("nan"), float("nan"))
         interval = "" if self.largest_interval is None else f", 95 % interval {low * 1e3:.3g} to {high * 1e3:.3g} µm"
         facts = [("verdict", f"{self.verdict}, limit {self.limit * 1e3:g} µm")] if self.verdict and self.limit else []
         facts += [("no verdict because", self.no_verdict_because)] if self.no_verdict_because else []
+        facts += [("verdict and interval", self.interval_note)] if self.interval_note else []
         facts += [
             ("largest", f"{self.largest * 1e3:.4g} µm at {point_text(self.largest_at)}{interval}"),
             ("rms", f"{self.rms * 1e3:.4g} µm"),
@@ -163,13 +184,15 @@ def volume_errors(
     for name in values:
         if not (known if name in ("largest", "rms", *DIAGONALS) else name[-1] not in missing):
             values[name] = math.nan
-    spreads = {}
+    spreads, chosen = {}, None
     if isinstance(source, Calibration) and source.covariance is not None:
-        spreads = _spreads(source, offset, positions, samples, seed, progress)
+        drawn_at = tuple(_thinned(axis, MOST_DRAWN) for axis in positions)
+        draws = _core.VolumeDraws(source, *drawn_at, tool=offset, seed=seed)
+        drawn = _drawn(draws, samples, progress)
+        spreads = _spreads(draws, drawn)
         if known:
-            along = _uncertainty_along(source, offset, found)
-            bias, u = spreads["largest"]
-            spreads["largest"] = bias, max(u, along)
+            there = _core.summarise_volume(machine, *drawn_at, tilts=False)
+            chosen = _chosen(found.largest, there.largest, draws.values, drawn)
     figures = {name: VolumeFigure(value, _interval(value, spreads.get(name))) for name, value in values.items()}
     nowhere = np.full(3, np.nan)
     not_judged = VolumeErrors(
@@ -181,7 +204,7 @@ def volume_errors(
         largest=figures["largest"].value,
         largest_at=found.largest_at if known else nowhere,
         largest_components=found.components if known else nowhere,
-        largest_spread=spreads.get("largest"),
+        largest_chosen=chosen,
         largest_interval=None,
         rms=figures["rms"].value,
         rms_interval=figures["rms"].interval,
@@ -205,16 +228,12 @@ def volume_errors(
 
 def judged(found: VolumeErrors, *, limit: float | None, between_nodes: float) -> VolumeErrors:
     """The same figures with this standard uncertainty by what lies between the nodes, beside this limit; mm."""
-    spread = None
-    if found.largest_spread is not None:
-        bias, u = found.largest_spread
-        spread = bias, math.hypot(u, between_nodes)
-    bounds = _interval(found.largest, spread, ONE_SIDED)
+    bounds = _bounds(found.largest_chosen, between_nodes, ONE_SIDED)
     verdict, why = _verdict(found.source, limit, bounds, found.missing)
     return replace(
         found,
         between_nodes=between_nodes,
-        largest_interval=_interval(found.largest, spread),
+        largest_interval=_bounds(found.largest_chosen, between_nodes, TWO_SIDED),
         bounds=bounds,
         limit=limit,
         verdict=verdict,
@@ -362,17 +381,10 @@ def _thinned(positions: FloatArray, most: int) -> FloatArray:
     return kept
 
 
-def _spreads(
-    calibration: Calibration,
-    tool: FloatArray,
-    grid: tuple[FloatArray, FloatArray, FloatArray],
-    samples: int,
-    seed: int,
-    progress: Callable[[int, int], None] | None,
-) -> dict[str, Spread]:
-    """Of every figure its bias and its standard uncertainty, from draws of the covariance."""
-    drawn_at = [_thinned(positions, MOST_DRAWN) for positions in grid]
-    draws = _core.VolumeDraws(calibration, *drawn_at, tool=tool, seed=seed)
+def _drawn(
+    draws: _core.VolumeDraws, samples: int, progress: Callable[[int, int], None] | None
+) -> npt.NDArray[np.float64]:
+    """So many draws, in parts."""
     parts, done = [], 0
     while done < samples:
         count = min(1000, samples - done)
@@ -380,35 +392,52 @@ def _spreads(
         done += count
         if progress is not None:
             progress(done, samples)
-    drawn = np.concatenate(parts)
+    return np.concatenate(parts)
+
+
+def _spreads(draws: _core.VolumeDraws, drawn: FloatArray) -> dict[str, Spread]:
+    """Of the figures their biases and standard uncertainties. Those of the largest error do not follow from them."""
     bias = drawn.mean(axis=0) - draws.values
     # A bias is known to about half of itself: that of the true errors is not that of the errors found.
     u = np.hypot(drawn.std(axis=0, ddof=1), 0.5 * bias)
-    return {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names(), bias, u, strict=True)}
+    spreads = {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names(), bias, u, strict=False)}
+    del spreads["largest"]
+    return spreads
 
 
-def _uncertainty_along(calibration: Calibration, tool: FloatArray, found: _core.VolumeSummary) -> float:
-    """Standard uncertainty of the largest error at its own place, along its own direction.
+def _chosen(largest: float, largest_where_drawn: float, own: FloatArray, drawn: FloatArray) -> ChosenPlaces:
+    """The places that draws choose; largest: of all positions, and of those where errors are drawn; own: a draw of
+    nothing."""
+    noise, u = drawn[:, -2], drawn[:, -1]
+    found = drawn[:, 0] - noise + (largest_where_drawn - own[0])  # draws are of first order, the largest is exact
+    judged = float(np.mean(found - noise))
+    return ChosenPlaces(np.append(largest, found), np.append(own[-1], u), judged)
 
-    Where places compete for the largest error, the largest of them scatters less than any of them, but its place does
-    not tell which one is the largest in truth."""
-    there = _core.error_at_point(calibration, found.largest_at, tool=tool).covariance[:3, :3]
-    direction = found.components / found.largest if found.largest > 0.0 else np.zeros(3)
-    return math.sqrt(max(float(direction @ there @ direction), 0.0))
 
-
-def _interval(value: float, spread: Spread | None, factor: float = TWO_SIDED) -> Interval | None:
-    """The value less its bias, plus and minus a multiple of its standard uncertainty; not below 0."""
+def _interval(value: float, spread: Spread | None) -> Interval | None:
+    """The value less its bias, plus and minus its expanded uncertainty; not below 0."""
     if spread is None or math.isnan(value):
         return None
     bias, u = spread
-    return max(value - bias - factor * u, 0.0), max(value - bias + factor * u, 0.0)
+    return max(value - bias - TWO_SIDED * u, 0.0), max(value - bias + TWO_SIDED * u, 0.0)
+
+
+def _bounds(chosen: ChosenPlaces | None, between_nodes: float, factor: float) -> Interval | None:
+    """Of the largest error, so many standard uncertainties away; not below 0.
+
+    It is at most what any place may have, along any direction. And it is at least what the places have that draws
+    choose, by values that have the opposite noise: the choice says nothing of that."""
+    if chosen is None:
+        return None
+    low = chosen.judged - factor * math.hypot(float(np.mean(chosen.u[1:])), between_nodes)
+    high = float(np.max(chosen.found + factor * np.hypot(chosen.u, between_nodes)))
+    return max(low, 0.0), high
 
 
 def _verdict(
     source: Calibration | Machine, limit: float | None, bounds: Interval | None, missing: Mapping[str, object]
 ) -> tuple[Verdict | None, str]:
-    """By the guard band of ISO 14253-1: a verdict is certain to 95 %; and why there is none."""
+    """By the guard band of ISO 14253-1: a verdict is wrong with at most 5 %; and why there is none."""
     if limit is None:
         return None, ""
     if isinstance(source, Calibration) and source.fit == "rejected":

@@ -17,6 +17,11 @@ namespace stepdiag {
 inline constexpr std::array<const char*, 15> volume_figures = {"largest", "rms",    "range X", "range Y", "range Z",
                                                                "tilt A",  "tilt B", "tilt C",  "range A", "range B",
                                                                "range C", "ppp",    "npp",     "pnp",     "nnp"};
+// Two columns after the figures, both of the place of a draw's largest error and along that error, mm: how much of it
+// was drawn, and the standard uncertainty of the calibration's error there.
+inline constexpr int drawn_at_largest = int(volume_figures.size());
+inline constexpr int uncertainty_at_largest = drawn_at_largest + 1;
+inline constexpr int volume_columns = uncertainty_at_largest + 1;
 
 class VolumeDraws {
 public:
@@ -27,11 +32,11 @@ public:
     ~VolumeDraws();
     VolumeDraws(VolumeDraws&&) noexcept;
 
-    // One row a draw, in the order of volume_figures. Draw number i has the same bits however the draws are divided
+    // One row a draw: volume_figures, then the two columns above. Draw number i has the same bits however the draws are divided
     // among calls and threads.
-    using Figures = Eigen::Matrix<double, Eigen::Dynamic, int(volume_figures.size()), Eigen::RowMajor>;
+    using Figures = Eigen::Matrix<double, Eigen::Dynamic, volume_columns, Eigen::RowMajor>;
     Figures draw(std::uint64_t first, std::size_t count) const;
-    // Of the calibration's own values.
+    // Of the calibration's own values, of which nothing is drawn.
     Eigen::RowVectorXd values() const;
 
 private:
