@@ -96,23 +96,24 @@ void bind_volume_errors(py::module_& m) {
                             "Draws of figures over a volume from the joint normal distribution of a calibration's "
                             "values, to first order.")
         .def(py::init([](const Calibration& calibration, const ArrayLike& x, const ArrayLike& y, const ArrayLike& z,
-                         const std::optional<ArrayLike>& tool, const IntegerLike& seed) {
+                         const std::optional<ArrayLike>& tool, const IntegerLike& seed,
+                         const std::optional<Eigen::MatrixXd>& covariance) {
                  const auto offset = tool ? std::optional(to_vector3(*tool, "tool")) : std::nullopt;
                  const GridPositions grid = to_grid(x, y, z);
                  const std::uint64_t number = to_seed(seed);
                  py::gil_scoped_release release;
-                 return std::make_unique<VolumeDraws>(calibration, grid, offset, number);
+                 return std::make_unique<VolumeDraws>(calibration, grid, offset, number, covariance);
              }),
              py::arg("calibration"), py::arg("x"), py::arg("y"), py::arg("z"), py::kw_only(),
-             py::arg("tool") = std::nullopt, py::arg("seed") = integer(0),
-             "On the grid of all combinations of these ascending positions (mm). Raises InvalidArgument for a "
-             "calibration without covariance.")
+             py::arg("tool") = std::nullopt, py::arg("seed") = integer(0), py::arg("covariance") = std::nullopt,
+             "On the grid of all combinations of these ascending positions (mm). covariance: of the calibration's "
+             "values; none: its own. Raises InvalidArgument for a calibration without covariance.")
         .def_static(
             "names", [] { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
-            "Columns of draw, without the last two.")
+            "Columns of draw, without the last five.")
         .def_property_readonly(
             "values", [](const VolumeDraws& draws) { return to_numpy_vector(draws.values()); },
-            "(17,) as a draw, of the calibration's own values, of which nothing is drawn.")
+            "(20,) as a draw, of the calibration's own values, of which nothing is drawn.")
         .def(
             "draw",
             [](const VolumeDraws& draws, const IntegerLike& first, const IntegerLike& count) {
@@ -124,9 +125,10 @@ void bind_volume_errors(py::module_& m) {
                 return to_numpy(figures);
             },
             py::arg("first"), py::arg("count"),
-            "(count, 17) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads. The "
-            "last two columns are of the place of the draw's largest error and along that error, mm: how much of it "
-            "was drawn, and the standard uncertainty of the calibration's error there.");
+            "(count, 20) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads. The "
+            "last five columns are of the place where the draw's error is largest: the length of the calibration's "
+            "error e there, that of e less what was drawn there, the standard uncertainty of e along e, and the traces "
+            "of its covariance V and of V V.");
 }
 
 }  // namespace stepdiag::bindings

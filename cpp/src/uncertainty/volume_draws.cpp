@@ -191,10 +191,15 @@ void VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest, 
             if (std::sqrt(bound2) > best) search(i, j);
         });
     squares(place[0], place[1]).maxCoeff(&place[2]);
-    const Vector3d along = grid.error(f, place).stableNormalized();
+    const Vector3d drawn = grid.error(rest, place), found = grid.error(f, place) - drawn;
+    const Vector3d along = found.stableNormalized();
+    const Eigen::Matrix3d variance = grid.error_covariance(covariance, place);
     row[0] = best;
-    row[drawn_at_largest] = along.dot(grid.error(rest, place));
-    row[uncertainty_at_largest] = std::sqrt(grid.variance(covariance, place, along));
+    row[found_at_largest] = found.norm();
+    row[opposite_at_largest] = (found - drawn).norm();
+    row[uncertainty_at_largest] = std::sqrt(std::max(along.dot(variance * along), 0.0));
+    row[variance_at_largest] = variance.trace();
+    row[variance2_at_largest] = variance.squaredNorm();
 }
 
 // Largest minus smallest value of a component of e.
@@ -281,14 +286,19 @@ void VolumeDraws::State::figures(const VolumeField& f, const VolumeField& rest, 
 }
 
 VolumeDraws::VolumeDraws(const Calibration& calibration, const GridPositions& positions,
-                         const std::optional<Vector3d>& tool, std::uint64_t seed) {
-    if (calibration.covariance.size() == 0)
+                         const std::optional<Vector3d>& tool, std::uint64_t seed,
+                         const std::optional<MatrixXd>& of_values) {
+    const MatrixXd& own = of_values ? *of_values : calibration.covariance;
+    const Index size = calibration_values(calibration).size();
+    if (of_values && (own.rows() != size || own.cols() != size))
+        throw InvalidArgument("covariance: expected one of the calibration's values");
+    if (own.size() == 0)
         throw InvalidArgument("calibration: expected one evaluated with full covariance");
     check_grid(positions);
     for (const auto& of_axis : positions)
         if (of_axis.size() < 2) throw InvalidArgument("grid: expected at least two positions an axis");
     const VolumeGrid grid(calibration, positions, tool_of(calibration, tool));
-    MatrixXd covariance = grid.covariance(calibration.covariance);
+    MatrixXd covariance = grid.covariance(own);
     NormalDraws normal(covariance, seed);
     auto state = std::make_unique<State>(State{grid,
                                                grid.table(calibration_values(calibration)),

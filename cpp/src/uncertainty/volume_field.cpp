@@ -1,7 +1,6 @@
 #include "uncertainty/volume_field.hpp"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 
 namespace stepdiag {
 
@@ -95,24 +94,27 @@ Eigen::Vector3d VolumeGrid::error(const VolumeField& f, const GridPlace& place) 
     return e;
 }
 
-double VolumeGrid::variance(const MatrixXd& covariance, const GridPlace& place, const Eigen::Vector3d& along) const {
+Eigen::Matrix3d VolumeGrid::error_covariance(const MatrixXd& covariance, const GridPlace& place) const {
     std::array<Index, 18> entry;
-    Eigen::Matrix<double, 18, 1> weight;
+    Eigen::Matrix<double, 3, 18> effect = Eigen::Matrix<double, 3, 18>::Zero();
     Eigen::Vector3d lever = tool_;  // of the rotations of an axis: from it to the functional point
-    Index after = Index(rows_.size());
+    Index first = Index(rows_.size());
     for (std::size_t r = 3; r-- > 0;) {
         Eigen::Vector3d own = Eigen::Vector3d::Zero();
         own[index(order_[r])] = position_[r][place[r]];
-        const Eigen::Vector3d turned = (carries_workpiece_[r] ? Eigen::Vector3d(lever + own) : lever).cross(along);
+        const Eigen::Vector3d of_rotations = carries_workpiece_[r] ? Eigen::Vector3d(lever + own) : lever;
         lever += own;
         const Index n = position_[r].size();
-        after -= 6 * n;
-        for (Index c = 0; c < 6; ++c) {
-            entry[6 * r + std::size_t(c)] = after + c * n + place[r];
-            weight[Index(6 * r) + c] = c < 3 ? along[c] : turned[c - 3];
+        first -= 6 * n;
+        for (Index c = 0; c < 3; ++c) {
+            const Index column = Index(6 * r) + c;
+            effect(c, column) = 1.0;
+            effect.col(column + 3) = Eigen::Vector3d::Unit(c).cross(of_rotations);
+            entry[std::size_t(column)] = first + c * n + place[r];
+            entry[std::size_t(column + 3)] = first + (c + 3) * n + place[r];
         }
     }
-    return std::max(weight.dot(covariance(entry, entry) * weight), 0.0);
+    return effect * covariance(entry, entry) * effect.transpose();
 }
 
 }  // namespace stepdiag

@@ -37,8 +37,8 @@ public:
     Eigen::MatrixXd covariance(const Eigen::MatrixXd& of_values) const;  // of a table
     void field(const double* table, VolumeField& field) const;
     Eigen::Vector3d error(const VolumeField& field, const GridPlace& place) const;
-    // Variance of the error at a place along a direction, from the covariance of a table.
-    double variance(const Eigen::MatrixXd& covariance, const GridPlace& place, const Eigen::Vector3d& along) const;
+    // Covariance of the error at a place, from that of a table.
+    Eigen::Matrix3d error_covariance(const Eigen::MatrixXd& covariance, const GridPlace& place) const;
     // Positions by components of one axis, in a table.
     Eigen::Map<const Eigen::MatrixXd> functions(const double* table, std::size_t rank) const;
 

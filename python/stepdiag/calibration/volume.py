@@ -37,6 +37,7 @@ SQUARENESS_OF: Final[Mapping[str, tuple[str, ...]]] = {"X": (), "Y": ("C0Y",), "
 TWO_SIDED: Final = NormalDist().inv_cdf(0.975)
 ONE_SIDED: Final = NormalDist().inv_cdf(0.95)
 FEWEST_SAMPLES: Final = 1000
+DRAWS_BETWEEN: Final = 1000  # of what lies between the nodes; its 95 % quantile is good to a tenth of its uncertainty
 MOST_NODES: Final = 201  # of an axis that are computed; 8 million points in a tenth of a second
 MOST_DRAWN: Final = 51  # positions an axis; more take much longer and change little
 # Lengths that differ by less were rounded on the way, mm.
@@ -65,12 +66,19 @@ class VolumeFigure:
 
 @dataclass(frozen=True, eq=False)
 class ChosenPlaces:
-    """What the bounds of the largest error rest on: draws add noise to the values of a calibration, and each chooses
-    the place and the direction of its largest error. Lengths in mm."""
+    """What the bounds of the largest error rest on. Draws add noise to the values of a calibration; each chooses the
+    place of its largest error. Arrays (n,) have a number for each draw, after that of the calibration itself; mm.
 
-    found: FloatArray  # (n,) the calibration's error there, along that direction; the first: its own largest error
-    u: FloatArray  # (n,) its standard uncertainty, without between_nodes
-    judged: float  # mean over the draws of `found` less the noise that chose; on average at most the true largest error
+    Of the calibration's error e at that place, with the covariance V: its length, the length of e less the noise that
+    chose, the standard uncertainty along e, and the traces of V and V V. raised: the largest error with draws of what
+    lies between the nodes, less that without, (m,); empty where nothing does."""
+
+    found: FloatArray
+    opposite: FloatArray
+    u: FloatArray
+    variance: FloatArray
+    variance2: FloatArray
+    raised: FloatArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -191,8 +199,11 @@ def volume_errors(
         drawn = _drawn(draws, samples, progress)
         spreads = _spreads(draws, drawn)
         if known:
-            there = _core.summarise_volume(machine, *drawn_at, tilts=False)
+            whole = all(len(some) == len(every) for some, every in zip(drawn_at, positions, strict=True))
+            there = found if whole else _core.summarise_volume(machine, *drawn_at, tilts=False)
             chosen = _chosen(found.largest, there.largest, draws.values, drawn)
+            if between > 0.0:
+                chosen = replace(chosen, raised=_raised(source, offset, drawn_at, between, seed))
     figures = {name: VolumeFigure(value, _interval(value, spreads.get(name))) for name, value in values.items()}
     nowhere = np.full(3, np.nan)
     not_judged = VolumeErrors(
@@ -223,17 +234,23 @@ def volume_errors(
         ranking=_ranking(source, machine, positions) if known and ranking else (),
         fit=source.fit if isinstance(source, Calibration) else None,
     )
-    return judged(not_judged, limit=limit, between_nodes=between)
+    return judged(not_judged, limit=limit)
 
 
-def judged(found: VolumeErrors, *, limit: float | None, between_nodes: float) -> VolumeErrors:
-    """The same figures with this standard uncertainty by what lies between the nodes, beside this limit; mm."""
-    bounds = _bounds(found.largest_chosen, between_nodes, ONE_SIDED)
+def without_between_nodes(found: VolumeErrors) -> VolumeErrors:
+    """The same figures, without a limit, as if nothing lay between the nodes."""
+    chosen = found.largest_chosen
+    kept = None if chosen is None else replace(chosen, raised=np.zeros(0))
+    return judged(replace(found, largest_chosen=kept, between_nodes=0.0), limit=None)
+
+
+def judged(found: VolumeErrors, *, limit: float | None) -> VolumeErrors:
+    """The same figures beside this limit, mm."""
+    bounds = _bounds(found.largest_chosen, found.between_nodes, 0.95)
     verdict, why = _verdict(found.source, limit, bounds, found.missing)
     return replace(
         found,
-        between_nodes=between_nodes,
-        largest_interval=_bounds(found.largest_chosen, between_nodes, TWO_SIDED),
+        largest_interval=_bounds(found.largest_chosen, found.between_nodes, 0.975),
         bounds=bounds,
         limit=limit,
         verdict=verdict,
@@ -408,10 +425,23 @@ def _spreads(draws: _core.VolumeDraws, drawn: FloatArray) -> dict[str, Spread]:
 def _chosen(largest: float, largest_where_drawn: float, own: FloatArray, drawn: FloatArray) -> ChosenPlaces:
     """The places that draws choose; largest: of all positions, and of those where errors are drawn; own: a draw of
     nothing."""
-    noise, u = drawn[:, -2], drawn[:, -1]
-    found = drawn[:, 0] - noise + (largest_where_drawn - own[0])  # draws are of first order, the largest is exact
-    judged = float(np.mean(found - noise))
-    return ChosenPlaces(np.append(largest, found), np.append(own[-1], u), judged)
+    rows = np.concatenate([own[None], drawn])
+    # Draws are of first order, the largest error is exact.
+    found, opposite = np.maximum(rows[:, -5:-3].T + (largest_where_drawn - own[0]), 0.0)
+    found[0] = largest
+    return ChosenPlaces(found, opposite, *rows[:, -3:].T, raised=np.zeros(0))
+
+
+def _raised(
+    calibration: Calibration, tool: FloatArray, grid: Sequence[FloatArray], between: float, seed: int
+) -> FloatArray:
+    """What lies between the nodes adds to the largest error in draws of it, mm.
+
+    A third of the variance is that of each axis. The largest error finds the middles of intervals, where a parabola is
+    sqrt(15/8) times its root mean square."""
+    variances = [15.0 / 8.0 * between**2 / 3.0 * (name[:2] in ("EX", "EY", "EZ")) for name, _ in calibration.covariance_labels]
+    draws = _core.VolumeDraws(calibration, *grid, tool=tool, seed=seed, covariance=np.diag(variances))
+    return draws.draw(0, DRAWS_BETWEEN)[:, 0] - draws.values[0]
 
 
 def _interval(value: float, spread: Spread | None) -> Interval | None:
@@ -422,16 +452,30 @@ def _interval(value: float, spread: Spread | None) -> Interval | None:
     return max(value - bias - TWO_SIDED * u, 0.0), max(value - bias + TWO_SIDED * u, 0.0)
 
 
-def _bounds(chosen: ChosenPlaces | None, between_nodes: float, factor: float) -> Interval | None:
-    """Of the largest error, so many standard uncertainties away; not below 0.
+def _bounds(chosen: ChosenPlaces | None, between_nodes: float, probability: float) -> Interval | None:
+    """Of the largest error: it is above the first and below the second with so much probability, each; not below 0.
 
-    It is at most what any place may have, along any direction. And it is at least what the places have that draws
-    choose, by values that have the opposite noise: the choice says nothing of that."""
+    The square of a length |e| that is found has the expectation |e|^2 + tr V and the variance 4 |e|^2 u^2 + 2 tr V V.
+    Above: the largest that any place may have; the largest found is that of all places, so that none needs a
+    correction for being chosen. Below: the places that draws choose, by values that have the opposite noise, of which
+    the choice does not tell anything. docs/volume.md has the reasons."""
     if chosen is None:
         return None
-    low = chosen.judged - factor * math.hypot(float(np.mean(chosen.u[1:])), between_nodes)
-    high = float(np.max(chosen.found + factor * np.hypot(chosen.u, between_nodes)))
-    return max(low, 0.0), high
+    factor = NormalDist().inv_cdf(probability)
+    square, half = chosen.found**2 - chosen.variance, 2.0 * (factor * chosen.u) ** 2
+    # x = square + factor sqrt(4 x u^2 + 2 variance2), solved for x
+    root = 2.0 * half * square + half**2 + 2.0 * factor**2 * chosen.variance2
+    high = math.sqrt(float(np.max(square + half + np.sqrt(np.maximum(root, 0.0)))))
+    if len(chosen.raised):
+        mean = max(float(np.mean(chosen.raised)), 0.0)
+        most = float(np.quantile(chosen.raised, probability)) - mean
+        high = chosen.found[0] + mean + math.hypot(high - chosen.found[0], most)
+    # Draws: noise of twice the variance. What lies between the nodes may be of any sign.
+    low2 = max(float(np.mean(chosen.opposite[1:] ** 2 - 2.0 * chosen.variance[1:])), 0.0)
+    u2, variance, variance2 = (float(np.mean(x[1:])) for x in (chosen.u**2, chosen.variance, chosen.variance2))
+    variance2 += 2.0 * between_nodes**2 * variance + 3.0 * between_nodes**4
+    spread = math.sqrt(4.0 * low2 * (u2 + between_nodes**2) + 2.0 * variance2)
+    return math.sqrt(max(low2 - factor * spread, 0.0)), high
 
 
 def _verdict(

@@ -94,7 +94,7 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                             if (e.norm() > largest) {
                                 largest = e.norm();
                                 worst = {positions[0][i], positions[1][j], positions[2][k]};
-                                there = e / largest;
+                                there = e;
                             }
                             mean2 += weights[0][i] * weights[1][j] * weights[2][k] * e.squaredNorm();
                             low = low.cwiseMin(e);
@@ -106,11 +106,16 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                 EXPECT_NEAR(found(draw, 1), std::sqrt(mean2), close) << chain << noise;
                 for (int c = 0; c < 3; ++c) EXPECT_NEAR(found(draw, 2 + c), high[c] - low[c], close) << chain << noise;
                 const Machine own = machine_of(calibration.chain, grid, grid.table(calibration_values(calibration)));
-                EXPECT_NEAR(found(draw, drawn_at_largest), largest - there.dot(own.first_order_error(worst)), close);
+                const Vector3d e = own.first_order_error(worst);
+                EXPECT_NEAR(found(draw, found_at_largest), e.norm(), close);
+                EXPECT_NEAR(found(draw, opposite_at_largest), (2.0 * e - there).norm(), close);
                 const Eigen::Matrix3d covariance =
                     error_at_point(calibration, worst, tool).covariance.topLeftCorner<3, 3>();
-                const double u = std::sqrt(there.dot(covariance * there));
-                EXPECT_NEAR(found(draw, uncertainty_at_largest), u, 1e-9 * u);  // of squares, in another order
+                const double variance = covariance.trace();
+                EXPECT_NEAR(std::pow(found(draw, uncertainty_at_largest), 2),
+                            e.dot(covariance * e) / e.squaredNorm(), 1e-12 * variance);
+                EXPECT_NEAR(found(draw, variance_at_largest), variance, 1e-12 * variance);
+                EXPECT_NEAR(found(draw, variance2_at_largest), covariance.squaredNorm(), 1e-12 * variance * variance);
             }
         }
 }

@@ -17,22 +17,27 @@ namespace stepdiag {
 inline constexpr std::array<const char*, 15> volume_figures = {"largest", "rms",    "range X", "range Y", "range Z",
                                                                "tilt A",  "tilt B", "tilt C",  "range A", "range B",
                                                                "range C", "ppp",    "npp",     "pnp",     "nnp"};
-// Two columns after the figures, both of the place of a draw's largest error and along that error, mm: how much of it
-// was drawn, and the standard uncertainty of the calibration's error there.
-inline constexpr int drawn_at_largest = int(volume_figures.size());
-inline constexpr int uncertainty_at_largest = drawn_at_largest + 1;
-inline constexpr int volume_columns = uncertainty_at_largest + 1;
+// Columns after the figures, of the place where a draw's error is largest. The length of the calibration's error e there
+// (mm), that of e less what was drawn there; standard uncertainty of e along e, and of the covariance V of e the traces
+// of V (mm^2) and V V.
+inline constexpr int found_at_largest = int(volume_figures.size());
+inline constexpr int opposite_at_largest = found_at_largest + 1;
+inline constexpr int uncertainty_at_largest = found_at_largest + 2;
+inline constexpr int variance_at_largest = found_at_largest + 3;
+inline constexpr int variance2_at_largest = found_at_largest + 4;
+inline constexpr int volume_columns = found_at_largest + 5;
 
 class VolumeDraws {
 public:
-    // Throws InvalidArgument for a calibration without covariance, and for a grid that does not ascend or has fewer
-    // than two positions an axis.
+    // covariance: of the calibration's values; none: its own. Throws InvalidArgument for a calibration without
+    // covariance, one of another size, and for a grid that does not ascend or has fewer than two positions an axis.
     VolumeDraws(const Calibration& calibration, const GridPositions& grid,
-                const std::optional<Eigen::Vector3d>& tool = {}, std::uint64_t seed = 0);
+                const std::optional<Eigen::Vector3d>& tool = {}, std::uint64_t seed = 0,
+                const std::optional<Eigen::MatrixXd>& covariance = {});
     ~VolumeDraws();
     VolumeDraws(VolumeDraws&&) noexcept;
 
-    // One row a draw: volume_figures, then the two columns above. Draw number i has the same bits however the draws are divided
+    // One row a draw: volume_figures, then the columns above. Draw number i has the same bits however the draws are divided
     // among calls and threads.
     using Figures = Eigen::Matrix<double, Eigen::Dynamic, volume_columns, Eigen::RowMajor>;
     Figures draw(std::uint64_t first, std::size_t count) const;
