@@ -1,6 +1,6 @@
 """Risks and power of the verdicts on a machine against a limit: of `volume --limit`, and of the rule before it.
 
-    ./run python benchmarks/volume_verdicts.py [--runs 10000] [--samples 1000] [--workers N] [--only WORDS]
+    ./run python benchmarks/volume_verdicts.py [--runs 10000] [--power-runs 2000] [--samples 1000] [--workers N] [--only WORDS]
 
 A run draws the values of a calibration about a true machine from the joint normal distribution that it states, and
 takes the bounds of `volume_errors`. The limit is the true largest error itself, so that "within" and "not within" are
@@ -8,7 +8,7 @@ both wrong: their shares are the risks where they are largest, just beyond and j
 largest error is 0.8 and 1.25 of the limit and its standard uncertainty u is 3 % of the limit.
 
 Cases: machines as they are drawn, with the covariances of their evaluations, times 1, 9 and 100; three equal scale
-errors; a machine with eight equal corners; one with ten equal places; one whose largest error is at a place that is
+errors, with nodes that are equally uncertain and with the covariance of an evaluation; a machine with eight equal corners; one with ten equal places; one whose largest error is at a place that is
 less certain than another; noise that is as large as the errors; what lies between the nodes, as one shift of the
 functional point and as a curve of every function in every interval.
 
@@ -49,6 +49,7 @@ RISK = 0.05
 LOST = 0.03  # of the right verdicts
 POWER_U = 0.03  # of the limit
 MACHINES = 100  # that are drawn, each for as many runs
+STEPS = 5  # of theirs
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class Truth:
 
 def drawn_machine(seed: int, level: float) -> Truth:
     """A machine of benchmarks/coverage.py with the covariance of its evaluation, times level^2."""
-    drawn, rng = coverage_cases.draw(ADJUSTMENT, seed)
+    drawn, rng = coverage_cases.draw(ADJUSTMENT, seed, STEPS)
     calibration = coverage_cases.evaluated(ADJUSTMENT, drawn, coverage_cases.measured(drawn, rng))
     errors = drawn.machine.errors
     functions = {name: (table[0], errors.function(name, table[0])) for name, table in calibration.functions.items()}
@@ -145,15 +146,20 @@ def with_u(truth: Truth, relative_u: float | None, between: float = 0.0, curves:
 
 
 def made(
-    own: dict[str, np.ndarray], u: dict[str, np.ndarray], box: np.ndarray | None = None, covariance: np.ndarray | None = None
+    own: dict[str, np.ndarray],
+    u: dict[str, np.ndarray],
+    box: np.ndarray | None = None,
+    covariance: np.ndarray | None = None,
 ) -> Truth:
-    """A machine with these functions at equidistant nodes; standard uncertainties relative to each other, of nodes
-    that are independent, unless a covariance is given."""
+    """A machine with these functions at equidistant nodes, others 0; standard uncertainties relative to each other, of
+    nodes that are independent, unless a covariance is given."""
     count = len(next(iter(own.values())))
-    nodes, nothing = np.linspace(0.0, EDGE, count), np.zeros(count)
-    functions = {name: (nodes, own.get(name, nothing)) for name in FUNCTIONS}
+    nothing = {axis: np.zeros(count if f"E{axis}{axis}" in own else 2) for axis in "XYZ"}
+    values = {name: own.get(name, nothing[name[2]]) for name in FUNCTIONS}
+    functions = {name: (np.linspace(0.0, EDGE, len(value)), value) for name, value in values.items()}
     if covariance is None:
-        covariance = np.diag(np.concatenate([*(u.get(name, nothing) for name in FUNCTIONS), np.zeros(3)]) ** 2)
+        uncertain = [u.get(name, nothing[name[2]]) for name in FUNCTIONS]
+        covariance = np.diag(np.concatenate([*uncertain, np.zeros(3)]) ** 2)
     volume = np.full(3, EDGE)
     whole = np.stack([np.zeros(3), volume])
     angles = dict.fromkeys(SQUARENESSES, 0.0)
@@ -228,7 +234,8 @@ RISKS: dict[str, Maker] = {
     "between nodes, shift of 3 u": many(relative_u=0.01, between=3.0),
     "between nodes, curves of u": many(relative_u=0.02, between=1.0, curves=True),
     "between nodes, curves of 3 u": many(relative_u=0.01, between=3.0, curves=True),
-    "between nodes, equal places, curves": one(equal_places, 0.02, 1.0, True),
+    "between nodes, equal places, u": one(equal_places, 0.02, 1.0, True),
+    "between nodes, equal places, 3 u": one(equal_places, 0.01, 3.0, True),
 }
 POWERS: dict[str, Callable[[float], Maker]] = {
     "drawn machines": lambda u: many(relative_u=u),
@@ -237,10 +244,13 @@ POWERS: dict[str, Callable[[float], Maker]] = {
     "eight equal corners": lambda u: one(equal_corners, u),
     "ten equal places": lambda u: one(equal_places, u),
     "less certain place": lambda u: one(less_certain_place, u),
+    "between nodes, shift of 3 u": lambda u: many(relative_u=u / math.sqrt(10.0), between=3.0),
 }
 
 
-def former_bounds(found: VolumeErrors, calibration: sd.Calibration, samples: int, seed: int, between: float) -> tuple[float, float]:
+def former_bounds(
+    found: VolumeErrors, calibration: sd.Calibration, samples: int, seed: int, between: float
+) -> tuple[float, float]:
     draws = _core.VolumeDraws(calibration, *found.grid, tool=found.tool, seed=seed)
     drawn, value = draws.draw(0, samples)[:, 0], draws.values[0]
     assert found.largest_chosen is not None

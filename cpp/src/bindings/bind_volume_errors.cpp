@@ -96,18 +96,17 @@ void bind_volume_errors(py::module_& m) {
                             "Draws of figures over a volume from the joint normal distribution of a calibration's "
                             "values, to first order.")
         .def(py::init([](const Calibration& calibration, const ArrayLike& x, const ArrayLike& y, const ArrayLike& z,
-                         const std::optional<ArrayLike>& tool, const IntegerLike& seed,
-                         const std::optional<Eigen::MatrixXd>& covariance) {
+                         const std::optional<ArrayLike>& tool, const IntegerLike& seed) {
                  const auto offset = tool ? std::optional(to_vector3(*tool, "tool")) : std::nullopt;
                  const GridPositions grid = to_grid(x, y, z);
                  const std::uint64_t number = to_seed(seed);
                  py::gil_scoped_release release;
-                 return std::make_unique<VolumeDraws>(calibration, grid, offset, number, covariance);
+                 return std::make_unique<VolumeDraws>(calibration, grid, offset, number);
              }),
              py::arg("calibration"), py::arg("x"), py::arg("y"), py::arg("z"), py::kw_only(),
-             py::arg("tool") = std::nullopt, py::arg("seed") = integer(0), py::arg("covariance") = std::nullopt,
-             "On the grid of all combinations of these ascending positions (mm). covariance: of the calibration's "
-             "values; none: its own. Raises InvalidArgument for a calibration without covariance.")
+             py::arg("tool") = std::nullopt, py::arg("seed") = integer(0),
+             "On the grid of all combinations of these ascending positions (mm). Raises InvalidArgument for a "
+             "calibration without covariance.")
         .def_static(
             "names", [] { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
             "Columns of draw, without the last five.")

@@ -286,19 +286,14 @@ void VolumeDraws::State::figures(const VolumeField& f, const VolumeField& rest, 
 }
 
 VolumeDraws::VolumeDraws(const Calibration& calibration, const GridPositions& positions,
-                         const std::optional<Vector3d>& tool, std::uint64_t seed,
-                         const std::optional<MatrixXd>& of_values) {
-    const MatrixXd& own = of_values ? *of_values : calibration.covariance;
-    const Index size = calibration_values(calibration).size();
-    if (of_values && (own.rows() != size || own.cols() != size))
-        throw InvalidArgument("covariance: expected one of the calibration's values");
-    if (own.size() == 0)
+                         const std::optional<Vector3d>& tool, std::uint64_t seed) {
+    if (calibration.covariance.size() == 0)
         throw InvalidArgument("calibration: expected one evaluated with full covariance");
     check_grid(positions);
     for (const auto& of_axis : positions)
         if (of_axis.size() < 2) throw InvalidArgument("grid: expected at least two positions an axis");
     const VolumeGrid grid(calibration, positions, tool_of(calibration, tool));
-    MatrixXd covariance = grid.covariance(own);
+    MatrixXd covariance = grid.covariance(calibration.covariance);
     NormalDraws normal(covariance, seed);
     auto state = std::make_unique<State>(State{grid,
                                                grid.table(calibration_values(calibration)),

@@ -439,8 +439,9 @@ def _raised(
 
     A third of the variance is that of each axis. The largest error finds the middles of intervals, where a parabola is
     sqrt(15/8) times its root mean square."""
-    variances = [15.0 / 8.0 * between**2 / 3.0 * (name[:2] in ("EX", "EY", "EZ")) for name, _ in calibration.covariance_labels]
-    draws = _core.VolumeDraws(calibration, *grid, tool=tool, seed=seed, covariance=np.diag(variances))
+    moves = np.array([name[:2] in ("EX", "EY", "EZ") for name, _ in calibration.covariance_labels])
+    only = _core.with_covariance(calibration, np.diag(15.0 / 8.0 * between**2 / 3.0 * moves))
+    draws = _core.VolumeDraws(only, *grid, tool=tool, seed=seed)
     return draws.draw(0, DRAWS_BETWEEN)[:, 0] - draws.values[0]
 
 
@@ -462,10 +463,14 @@ def _bounds(chosen: ChosenPlaces | None, between_nodes: float, probability: floa
     if chosen is None:
         return None
     factor = NormalDist().inv_cdf(probability)
-    square, half = chosen.found**2 - chosen.variance, 2.0 * (factor * chosen.u) ** 2
-    # x = square + factor sqrt(4 x u^2 + 2 variance2), solved for x
-    root = 2.0 * half * square + half**2 + 2.0 * factor**2 * chosen.variance2
-    high = math.sqrt(float(np.max(square + half + np.sqrt(np.maximum(root, 0.0)))))
+    squares = _squares_above(chosen, np.full_like(chosen.u, factor))
+    # Cornish and Fisher's first term: the distribution is skew, and shorter below. The third cumulant is
+    # 8 tr V^3 + 24 e V^2 e, and in three dimensions tr V^3 is at least (tr V^2)^1.5/sqrt(3).
+    cumulant = 8.0 / math.sqrt(3.0) * chosen.variance2**1.5 + 24.0 * squares * chosen.u**4
+    cubes = (4.0 * squares * chosen.u**2 + 2.0 * chosen.variance2) ** 1.5
+    skewness = np.divide(cumulant, cubes, out=np.zeros_like(cubes), where=cubes > 0.0)
+    squares = _squares_above(chosen, factor - (factor**2 - 1.0) / 6.0 * skewness)
+    high = max(math.sqrt(float(np.max(squares))), float(chosen.found[0]))
     if len(chosen.raised):
         mean = max(float(np.mean(chosen.raised)), 0.0)
         most = float(np.quantile(chosen.raised, probability)) - mean
@@ -476,6 +481,15 @@ def _bounds(chosen: ChosenPlaces | None, between_nodes: float, probability: floa
     variance2 += 2.0 * between_nodes**2 * variance + 3.0 * between_nodes**4
     spread = math.sqrt(4.0 * low2 * (u2 + between_nodes**2) + 2.0 * variance2)
     return math.sqrt(max(low2 - factor * spread, 0.0)), high
+
+
+def _squares_above(chosen: ChosenPlaces, factor: FloatArray) -> FloatArray:
+    """The x that are so many standard deviations of a found square above its own: x = found^2 - variance
+    + factor sqrt(4 x u^2 + 2 variance2)."""
+    square, half = chosen.found**2 - chosen.variance, 2.0 * (factor * chosen.u) ** 2
+    root = np.maximum(2.0 * half * square + half**2 + 2.0 * factor**2 * chosen.variance2, 0.0)
+    above: FloatArray = np.maximum(square + half + np.sqrt(root), 0.0)
+    return above
 
 
 def _verdict(

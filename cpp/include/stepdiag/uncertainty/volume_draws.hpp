@@ -29,11 +29,10 @@ inline constexpr int volume_columns = found_at_largest + 5;
 
 class VolumeDraws {
 public:
-    // covariance: of the calibration's values; none: its own. Throws InvalidArgument for a calibration without
-    // covariance, one of another size, and for a grid that does not ascend or has fewer than two positions an axis.
+    // Throws InvalidArgument for a calibration without covariance, and for a grid that does not ascend or has fewer
+    // than two positions an axis.
     VolumeDraws(const Calibration& calibration, const GridPositions& grid,
-                const std::optional<Eigen::Vector3d>& tool = {}, std::uint64_t seed = 0,
-                const std::optional<Eigen::MatrixXd>& covariance = {});
+                const std::optional<Eigen::Vector3d>& tool = {}, std::uint64_t seed = 0);
     ~VolumeDraws();
     VolumeDraws(VolumeDraws&&) noexcept;
 
