@@ -125,9 +125,9 @@ void bind_volume_errors(py::module_& m) {
             },
             py::arg("first"), py::arg("count"),
             "(count, 20) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads. The "
-            "last five columns are of the place where the draw's error is largest: the length of the calibration's "
-            "error e there, that of e less what was drawn there, the standard uncertainty of e along e, and the traces "
-            "of its covariance V and of V V.");
+            "last five columns are of the place and the direction of the draw's largest error: the calibration's error "
+            "e there along that direction, the length of e less what was drawn there, the standard uncertainty of e "
+            "along the direction, and the traces of its covariance V and of V V.");
 }
 
 }  // namespace stepdiag::bindings

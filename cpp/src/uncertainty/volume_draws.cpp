@@ -191,11 +191,11 @@ void VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest, 
             if (std::sqrt(bound2) > best) search(i, j);
         });
     squares(place[0], place[1]).maxCoeff(&place[2]);
-    const Vector3d drawn = grid.error(rest, place), found = grid.error(f, place) - drawn;
-    const Vector3d along = found.stableNormalized();
+    const Vector3d error = grid.error(f, place), drawn = grid.error(rest, place);
+    const Vector3d along = error.stableNormalized(), found = error - drawn;
     const Eigen::Matrix3d variance = grid.error_covariance(covariance, place);
     row[0] = best;
-    row[found_at_largest] = found.norm();
+    row[found_at_largest] = along.dot(found);
     row[opposite_at_largest] = (found - drawn).norm();
     row[uncertainty_at_largest] = std::sqrt(std::max(along.dot(variance * along), 0.0));
     row[variance_at_largest] = variance.trace();

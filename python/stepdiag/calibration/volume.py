@@ -67,10 +67,11 @@ class VolumeFigure:
 @dataclass(frozen=True, eq=False)
 class ChosenPlaces:
     """What the bounds of the largest error rest on. Draws add noise to the values of a calibration; each chooses the
-    place of its largest error. Arrays (n,) have a number for each draw, after that of the calibration itself; mm.
+    the place and the direction of its largest error. Arrays (n,) have a number for each draw, after that of the
+    calibration itself; mm.
 
-    Of the calibration's error e at that place, with the covariance V: its length, the length of e less the noise that
-    chose, the standard uncertainty along e, and the traces of V and V V. raised: the largest error with draws of what
+    Of the calibration's error e at that place, with the covariance V: e along the direction, the length of e less the
+    noise that chose, the standard uncertainty along the direction, and the traces of V and V V. raised: the largest error with draws of what
     lies between the nodes, less that without, (m,); empty where nothing does."""
 
     found: FloatArray
@@ -427,7 +428,7 @@ def _chosen(largest: float, largest_where_drawn: float, own: FloatArray, drawn: 
     nothing."""
     rows = np.concatenate([own[None], drawn])
     # Draws are of first order, the largest error is exact.
-    found, opposite = np.maximum(rows[:, -5:-3].T + (largest_where_drawn - own[0]), 0.0)
+    found, opposite = rows[:, -5:-3].T + (largest_where_drawn - own[0])
     found[0] = largest
     return ChosenPlaces(found, opposite, *rows[:, -3:].T, raised=np.zeros(0))
 
@@ -456,40 +457,26 @@ def _interval(value: float, spread: Spread | None) -> Interval | None:
 def _bounds(chosen: ChosenPlaces | None, between_nodes: float, probability: float) -> Interval | None:
     """Of the largest error: it is above the first and below the second with so much probability, each; not below 0.
 
-    The square of a length |e| that is found has the expectation |e|^2 + tr V and the variance 4 |e|^2 u^2 + 2 tr V V.
-    Above: the largest that any place may have; the largest found is that of all places, so that none needs a
-    correction for being chosen. Below: the places that draws choose, by values that have the opposite noise, of which
-    the choice does not tell anything. docs/volume.md has the reasons."""
+    Above: the largest that any place may have along any direction. The largest error found is at least that of the
+    place and the direction where the true one is largest, so that none needs a correction for being chosen. Below: the
+    places that draws choose, by values that have the opposite noise, of which the choice does not tell anything. The
+    square of a length |e| that is found has the expectation |e|^2 + tr V and the variance 4 |e|^2 u^2 + 2 tr V V.
+    docs/volume.md has the reasons."""
     if chosen is None:
         return None
     factor = NormalDist().inv_cdf(probability)
-    squares = _squares_above(chosen, np.full_like(chosen.u, factor))
-    # Cornish and Fisher's first term: the distribution is skew, and shorter below. The third cumulant is
-    # 8 tr V^3 + 24 e V^2 e, and in three dimensions tr V^3 is at least (tr V^2)^1.5/sqrt(3).
-    cumulant = 8.0 / math.sqrt(3.0) * chosen.variance2**1.5 + 24.0 * squares * chosen.u**4
-    cubes = (4.0 * squares * chosen.u**2 + 2.0 * chosen.variance2) ** 1.5
-    skewness = np.divide(cumulant, cubes, out=np.zeros_like(cubes), where=cubes > 0.0)
-    squares = _squares_above(chosen, factor - (factor**2 - 1.0) / 6.0 * skewness)
-    high = max(math.sqrt(float(np.max(squares))), float(chosen.found[0]))
+    high = float(np.max(chosen.found + factor * chosen.u))
     if len(chosen.raised):
         mean = max(float(np.mean(chosen.raised)), 0.0)
         most = float(np.quantile(chosen.raised, probability)) - mean
-        high = chosen.found[0] + mean + math.hypot(high - chosen.found[0], most)
+        own = float(chosen.found[0])
+        high = own + mean + math.hypot(high - own, most)
     # Draws: noise of twice the variance. What lies between the nodes may be of any sign.
     low2 = max(float(np.mean(chosen.opposite[1:] ** 2 - 2.0 * chosen.variance[1:])), 0.0)
     u2, variance, variance2 = (float(np.mean(x[1:])) for x in (chosen.u**2, chosen.variance, chosen.variance2))
     variance2 += 2.0 * between_nodes**2 * variance + 3.0 * between_nodes**4
     spread = math.sqrt(4.0 * low2 * (u2 + between_nodes**2) + 2.0 * variance2)
     return math.sqrt(max(low2 - factor * spread, 0.0)), high
-
-
-def _squares_above(chosen: ChosenPlaces, factor: FloatArray) -> FloatArray:
-    """The x that are so many standard deviations of a found square above its own: x = found^2 - variance
-    + factor sqrt(4 x u^2 + 2 variance2)."""
-    square, half = chosen.found**2 - chosen.variance, 2.0 * (factor * chosen.u) ** 2
-    root = np.maximum(2.0 * half * square + half**2 + 2.0 * factor**2 * chosen.variance2, 0.0)
-    above: FloatArray = np.maximum(square + half + np.sqrt(root), 0.0)
-    return above
 
 
 def _verdict(

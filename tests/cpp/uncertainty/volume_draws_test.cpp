@@ -107,13 +107,14 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                 for (int c = 0; c < 3; ++c) EXPECT_NEAR(found(draw, 2 + c), high[c] - low[c], close) << chain << noise;
                 const Machine own = machine_of(calibration.chain, grid, grid.table(calibration_values(calibration)));
                 const Vector3d e = own.first_order_error(worst);
-                EXPECT_NEAR(found(draw, found_at_largest), e.norm(), close);
+                const Vector3d along = there / largest;
+                EXPECT_NEAR(found(draw, found_at_largest), along.dot(e), close);
                 EXPECT_NEAR(found(draw, opposite_at_largest), (2.0 * e - there).norm(), close);
                 const Eigen::Matrix3d covariance =
                     error_at_point(calibration, worst, tool).covariance.topLeftCorner<3, 3>();
                 const double variance = covariance.trace();
                 EXPECT_NEAR(std::pow(found(draw, uncertainty_at_largest), 2),
-                            e.dot(covariance * e) / e.squaredNorm(), 1e-12 * variance);
+                            along.dot(covariance * along), 1e-12 * variance);
                 EXPECT_NEAR(found(draw, variance_at_largest), variance, 1e-12 * variance);
                 EXPECT_NEAR(found(draw, variance2_at_largest), covariance.squaredNorm(), 1e-12 * variance * variance);
             }

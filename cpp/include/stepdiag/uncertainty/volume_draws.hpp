@@ -17,9 +17,9 @@ namespace stepdiag {
 inline constexpr std::array<const char*, 15> volume_figures = {"largest", "rms",    "range X", "range Y", "range Z",
                                                                "tilt A",  "tilt B", "tilt C",  "range A", "range B",
                                                                "range C", "ppp",    "npp",     "pnp",     "nnp"};
-// Columns after the figures, of the place where a draw's error is largest. The length of the calibration's error e there
-// (mm), that of e less what was drawn there; standard uncertainty of e along e, and of the covariance V of e the traces
-// of V (mm^2) and V V.
+// Columns after the figures, of the place and the direction of a draw's largest error: the calibration's error e there
+// along that direction, and the length of e less what was drawn there (mm); the standard uncertainty of e along the
+// direction, and of the covariance V of e the traces of V (mm^2) and V V.
 inline constexpr int found_at_largest = int(volume_figures.size());
 inline constexpr int opposite_at_largest = found_at_largest + 1;
 inline constexpr int uncertainty_at_largest = found_at_largest + 2;
