@@ -1,17 +1,18 @@
 """Risks and power of the verdicts on a machine against a limit: of `volume --limit`, and of the rule before it.
 
-    ./run python benchmarks/volume_verdicts.py [--runs 10000] [--power-runs 2000] [--samples 1000] [--workers N] [--only WORDS]
+    ./run python benchmarks/volume_verdicts.py [--runs 10000] [--power-runs 2000] [--samples 1000] [--only WORDS]
 
 A run draws the values of a calibration about a true machine from the joint normal distribution that it states, and
 takes the bounds of `volume_errors`. The limit is the true largest error itself, so that "within" and "not within" are
 both wrong: their shares are the risks where they are largest, just beyond and just below the limit. For power, the true
 largest error is 0.8 and 1.25 of the limit. Its standard uncertainty is 3 % of the limit, as that of a plan: the root of
-the variances along X, Y and Z together. ("u across": along itself 3 %, and 16 % in each direction across.)
+the variances along X, Y and Z together. ("u across": 3 % along itself, and 16 % in each direction across.)
 
 Cases: machines as they are drawn, with the covariances of their evaluations, times 1, 9 and 100; three equal scale
-errors, with nodes that are equally uncertain and with the covariance of an evaluation; a machine with eight equal corners; one with ten equal places; one whose largest error is at a place that is
-less certain than another; noise that is as large as the errors; what lies between the nodes, as one shift of the
-functional point and as a curve of every function in every interval.
+errors, with nodes that are equally uncertain and with the covariance of an evaluation; a place that is uncertain along
+a line askew to its error; a machine with eight equal corners; one with ten equal places; one whose largest error is at
+a place that is less certain than another; noise that is as large as the errors; what lies between the nodes, as one
+shift of the functional point and as a curve of every function in every interval.
 
 The former rule was value - b -/+ 1.645 sqrt(max(s, u)^2 + (b/2)^2 + u_n^2), b and s: bias and scatter of the draws.
 
@@ -178,7 +179,7 @@ def made(
 def equal_scales() -> Truth:
     """10 um at the end of each axis, whose nodes are equally uncertain."""
     share = np.linspace(0.0, 1.0, 5)
-    own = {name: 1e-2 * share for name in ("EXX", "EYY", "EZZ")}
+    own = dict.fromkeys(("EXX", "EYY", "EZZ"), 0.01 * share)
     return made(own, dict.fromkeys(own, np.sign(share)))
 
 
@@ -186,7 +187,7 @@ def equal_scales_evaluated() -> Truth:
     """The same, with the covariance of an evaluation: the error is much less certain across itself than along."""
     plan = sd.Plan(np.full(3, EDGE), coverage_cases.DIAGONALS, 5, scale_lines=coverage_cases.SCALE_LINES)
     nodes = np.linspace(0.0, EDGE, 6)
-    errors = sd.ErrorMap({name: (nodes, 1e-2 * nodes / EDGE) for name in ("EXX", "EYY", "EZZ")}, {})
+    errors = sd.ErrorMap(dict.fromkeys(("EXX", "EYY", "EZZ"), (nodes, 0.01 * nodes / EDGE)), {})
     run = sd.simulate(sd.Machine(CHAIN, errors, np.zeros(3)), plan, sd.Head(), noise=sd.Noise(distance=1e-4, tilt=1e-6))
     options = {"uncertainty": sd.ReadingUncertainty(distance=1e-4, tilt=1e-6), "full_covariance": True}
     calibration = sd.adjust(run, plan, sd.Head(), sd.Chain(CHAIN), np.zeros(3), **options).calibration
@@ -197,7 +198,7 @@ def equal_scales_evaluated() -> Truth:
 def equal_corners() -> Truth:
     """+- 10 um at both ends of each axis; every function of translation is uncertain there."""
     nodes = np.array([0.0, -1.0, -0.5, 0.5, 1.0])  # 0 at home; the box begins at the second
-    own = {name: 1e-2 * nodes for name in ("EXX", "EYY", "EZZ")}
+    own = dict.fromkeys(("EXX", "EYY", "EZZ"), 0.01 * nodes)
     u = {name: np.array([0.0, 1.0, 1.0, 1.0, 1.0]) for name in FUNCTIONS if name[1] in "XYZ"}
     return made(own, u, np.stack([np.full(3, EDGE / 4), np.full(3, EDGE)]))
 
@@ -214,7 +215,7 @@ def less_certain_place() -> Truth:
 
 
 def uncertain_askew() -> Truth:
-    """10 um along X at the end of X, which is uncertain along a line that is askew to it, cos 0.36, and hardly across."""
+    """10 um along X at the end of X, which is uncertain along a line askew to it, cosine 0.36, and hardly across."""
     count = 2
     truth = made({"EXX": np.array([0.0, 1e-2])}, {})
     along, covariance = np.array([0.36, math.sqrt(1.0 - 0.36**2), 0.0]), truth.covariance.copy()
@@ -325,7 +326,7 @@ def risks(pool: multiprocessing.pool.Pool, chosen: list[str], runs: int, samples
         good = max(within, beyond) <= allowed
         holds &= bool(good)
         shares = [np.mean(high_before <= 1.0), within, np.mean(low_before > 1.0), beyond]
-        shares += [np.mean((least <= 1.0) & (1.0 <= most)), np.mean((low <= 1.0) & (high > 1.0))]
+        shares += [np.mean((least <= 1.0) & (most >= 1.0)), np.mean((low <= 1.0) & (high > 1.0))]
         cells = "".join(f"{100 * share:{n}.2f} %" for share, n in zip(shares, (7, 7, 9, 7, 8, 10), strict=True))
         mark = "" if good else "  ABOVE"
         print(f"  {name:36}{100 * np.median(u):4.0f} %{cells}{mark}   ({time.monotonic() - start:.0f} s)", flush=True)

@@ -89,8 +89,8 @@ Eigen::Vector3d VolumeGrid::error(const VolumeField& f, const GridPlace& place) 
     const double p2 = position_[1][j], p3 = position_[2][k];
     Eigen::Vector3d e;
     for (std::size_t c = 0; c < 3; ++c)
-        e[Index(c)] = f.own[0][c][i] + f.own[1][c][j] + f.own[2][c][k] + f.g12[c][i] * p2 +
-                      (f.g13[c][i] + f.g23[c][j]) * p3;
+        e[Index(c)] =
+            f.own[0][c][i] + f.own[1][c][j] + f.own[2][c][k] + f.g12[c][i] * p2 + (f.g13[c][i] + f.g23[c][j]) * p3;
     return e;
 }
 

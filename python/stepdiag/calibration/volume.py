@@ -67,12 +67,12 @@ class VolumeFigure:
 @dataclass(frozen=True, eq=False)
 class ChosenPlaces:
     """What the bounds of the largest error rest on. Draws add noise to the values of a calibration; each chooses the
-    the place and the direction of its largest error. Arrays (n,) have a number for each draw, after that of the
+    place and the direction of its largest error. Arrays (n,) have a number for each draw, after that of the
     calibration itself; mm.
 
     Of the calibration's error e at that place, with the covariance V: e along the direction, the length of e less the
-    noise that chose, the standard uncertainty along the direction, and the traces of V and V V. raised: the largest error with draws of what
-    lies between the nodes, less that without, (m,); empty where nothing does."""
+    noise that chose, the standard uncertainty along the direction, and the traces of V and V V. raised: the largest
+    error with draws of what lies between the nodes, less that without, (m,); empty where nothing does."""
 
     found: FloatArray
     opposite: FloatArray

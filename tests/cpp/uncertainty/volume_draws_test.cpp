@@ -113,8 +113,8 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                 const Eigen::Matrix3d covariance =
                     error_at_point(calibration, worst, tool).covariance.topLeftCorner<3, 3>();
                 const double variance = covariance.trace();
-                EXPECT_NEAR(std::pow(found(draw, uncertainty_at_largest), 2),
-                            along.dot(covariance * along), 1e-12 * variance);
+                EXPECT_NEAR(std::pow(found(draw, uncertainty_at_largest), 2), along.dot(covariance * along),
+                            1e-12 * variance);
                 EXPECT_NEAR(found(draw, variance_at_largest), variance, 1e-12 * variance);
                 EXPECT_NEAR(found(draw, variance2_at_largest), covariance.squaredNorm(), 1e-12 * variance * variance);
             }

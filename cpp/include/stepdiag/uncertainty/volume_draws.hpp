@@ -36,8 +36,8 @@ public:
     ~VolumeDraws();
     VolumeDraws(VolumeDraws&&) noexcept;
 
-    // One row a draw: volume_figures, then the columns above. Draw number i has the same bits however the draws are divided
-    // among calls and threads.
+    // One row a draw: volume_figures, then the columns above. Draw number i has the same bits however the draws are
+    // divided among calls and threads.
     using Figures = Eigen::Matrix<double, Eigen::Dynamic, volume_columns, Eigen::RowMajor>;
     Figures draw(std::uint64_t first, std::size_t count) const;
     // Of the calibration's own values, of which nothing is drawn.
