@@ -338,7 +338,7 @@ def test_where_noise_dominates_not_within_is_wrong_in_five_percent_at_most() -> 
 
 def test_one_place_has_the_bounds_of_a_normal_distribution() -> None:
     bounds = bounds_of_places(np.array([0.0, 0.01]), np.array([0.0, 1e-4]), 1)[0]
-    # 0.01 mm and noise of u = 0.1 um, whose first normal number of seed 1 is at index 1. The upper bound is found + k u.
+    # 10 um and noise of u = 0.1 um: the second normal number of the seed, as the first is of the node at home.
     found = 0.01 + 1e-4 * np.random.default_rng(1).standard_normal(2)[1]
     assert bounds[1] == pytest.approx(found + 1.644854e-4, abs=1e-9)
     # The lower one has the mean of 1000 squares: noise of 2 u/sqrt(1000), and second order, u^2/L, of 1 % of u.
