@@ -430,7 +430,8 @@ def _chosen(largest: float, largest_where_drawn: float, own: FloatArray, drawn: 
     # Draws are of first order, the largest error is exact.
     found, opposite = rows[:, -5:-3].T + (largest_where_drawn - own[0])
     found[0] = largest
-    return ChosenPlaces(found, opposite, *rows[:, -3:].T, raised=np.zeros(0))
+    u, variance, variance2 = rows[:, -3:].T
+    return ChosenPlaces(found, opposite, u, variance, variance2, raised=np.zeros(0))
 
 
 def _raised(
@@ -443,7 +444,8 @@ def _raised(
     moves = np.array([name[:2] in ("EX", "EY", "EZ") for name, _ in calibration.covariance_labels])
     only = _core.with_covariance(calibration, np.diag(15.0 / 8.0 * between**2 / 3.0 * moves))
     draws = _core.VolumeDraws(only, *grid, tool=tool, seed=seed)
-    return draws.draw(0, DRAWS_BETWEEN)[:, 0] - draws.values[0]
+    raised: FloatArray = draws.draw(0, DRAWS_BETWEEN)[:, 0] - draws.values[0]
+    return raised
 
 
 def _interval(value: float, spread: Spread | None) -> Interval | None:
