@@ -5,12 +5,13 @@
 Random machines, set-ups and noise (those of benchmarks/coverage.py, case adjustment), simulated and evaluated once,
 with the stated noise and with multiples of it: from a noise that is far below the machine's errors to one that is not.
 For each level the table shows the share of machines whose interval covers the true largest error, rms error and ranges
-at the nodes, and how often the true largest error lies beyond each one-sided 95 % bound, on which verdicts rest.
+at the nodes, and how often the true largest error lies beyond each one-sided 95 % bound, on which verdicts rest
+(benchmarks/volume_verdicts.py has the machines that are hardest to judge).
 Then standard deviations of these figures over whole virtual calibrations stand beside those of draws of the covariance.
 
-The exit code is 1 if the coverage of the largest error over all levels is not within 94 to 96 %, if that of a level is
-off by more than four binomial standard deviations beyond that, or if a standard deviation differs by more than 3 %
-beyond four of its own.
+The exit code is 1 if the coverage of the largest error over all levels is below 94 %, if that of a level is below that
+by more than four binomial standard deviations, or if a standard deviation differs by more than 3 % beyond four of its
+own.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from stepdiag import _core
 
 CASE = coverage_cases.CASES["adjustment"]
 LEVELS = (1.0, 3.0, 10.0)
-LOW, HIGH = 0.94, 0.96
+LOW = 0.94
 CLOSE = 0.03
 CHUNK = 20
 FIGURES = ("largest", "rms", "range X", "range Y", "range Z")
@@ -84,10 +85,10 @@ def coverage(machines: int, steps: int, samples: int, workers: int) -> bool:
                 flush=True,
             )
             tolerance = 4.0 * np.sqrt(0.95 * 0.05 / machines)
-            holds &= bool(LOW - tolerance <= shares[0] <= HIGH + tolerance)
+            holds &= bool(LOW - tolerance <= shares[0])
     pooled = float(np.concatenate(everything)[:, 0].mean())
-    print(f"  largest error, all levels: {100 * pooled:.2f} %, expected {100 * LOW:.0f} to {100 * HIGH:.0f} %")
-    return holds and LOW <= pooled <= HIGH
+    print(f"  largest error, all levels: {100 * pooled:.2f} %, expected at least {100 * LOW:.0f} %")
+    return holds and pooled >= LOW
 
 
 def virtual(steps: int, samples: int) -> bool:

@@ -3384,7 +3384,7 @@ class VolumeDraws:
     @staticmethod
     def names() -> list[str]:
         """
-        Columns of draw.
+        Columns of draw, without the last five.
         """
     def __init__(self, calibration: Calibration, x: numpy.typing.ArrayLike, y: numpy.typing.ArrayLike, z: numpy.typing.ArrayLike, *, tool: numpy.typing.ArrayLike | None = None, seed: typing.SupportsIndex = 0) -> None:
         """
@@ -3392,12 +3392,12 @@ class VolumeDraws:
         """
     def draw(self, first: typing.SupportsIndex, count: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (count, 15) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads.
+        (count, 20) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads. The last five columns are of the place and the direction of the draw's largest error: the calibration's error e there along that direction, the length of e less what was drawn there, the standard uncertainty of e along the direction, and the traces of its covariance V and of V V.
         """
     @property
     def values(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (15,) figures of the calibration's own values.
+        (20,) as a draw, of the calibration's own values, of which nothing is drawn.
         """
 class VirtualCalibrations(SampleModel):
     """

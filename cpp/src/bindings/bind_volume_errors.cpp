@@ -109,10 +109,10 @@ void bind_volume_errors(py::module_& m) {
              "calibration without covariance.")
         .def_static(
             "names", [] { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
-            "Columns of draw.")
+            "Columns of draw, without the last five.")
         .def_property_readonly(
             "values", [](const VolumeDraws& draws) { return to_numpy_vector(draws.values()); },
-            "(15,) figures of the calibration's own values.")
+            "(20,) as a draw, of the calibration's own values, of which nothing is drawn.")
         .def(
             "draw",
             [](const VolumeDraws& draws, const IntegerLike& first, const IntegerLike& count) {
@@ -124,7 +124,10 @@ void bind_volume_errors(py::module_& m) {
                 return to_numpy(figures);
             },
             py::arg("first"), py::arg("count"),
-            "(count, 15) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads.");
+            "(count, 20) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads. The "
+            "last five columns are of the place and the direction of the draw's largest error: the calibration's error "
+            "e there along that direction, the length of e less what was drawn there, the standard uncertainty of e "
+            "along the direction, and the traces of its covariance V and of V V.");
 }
 
 }  // namespace stepdiag::bindings

@@ -70,7 +70,8 @@ struct VolumeDraws::State {
     VolumeGrid grid;
     VectorXd table;  // of the calibration
     VolumeField field;
-    NormalDraws draws;  // of a table, beside the calibration's
+    MatrixXd covariance;  // of a table
+    NormalDraws draws;    // of a table, beside the calibration's
     std::array<VectorXd, 3> weight;
     std::vector<Ceiling> ceilings;   // of the calibration's field: X, -X, Y, -Y, Z, -Z, |e|
     std::array<double, 3> farthest;  // largest |p|
@@ -88,7 +89,9 @@ struct VolumeDraws::State {
     // `rest` is what the field has beside the calibration's, `table` that of the field.
     template <class Row>
     void figures(const VolumeField& field, const VolumeField& rest, const double* table, Row&& row) const;
-    double largest(const VolumeField& field, const VolumeField& rest) const;
+    // Fills in the largest error and the columns of its place.
+    template <class Row>
+    void largest(const VolumeField& field, const VolumeField& rest, Row&& row) const;
     double range(const VolumeField& field, const VolumeField& rest, std::size_t component) const;
     double mean_square(const VolumeField& field, std::size_t component) const;
     double diagonal(const VolumeField& field, std::size_t d) const;
@@ -146,8 +149,8 @@ void VolumeDraws::State::set_diagonals(const GridPositions& positions, const Cha
     }
 }
 
-// Largest |e|.
-double VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest) const {
+template <class Row>
+void VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest, Row&& row) const {
     const ArrayXd &p2 = grid.position(1), &p3 = grid.position(2);
     const auto length = [](const VolumeField::Component3& v) {
         return ArrayXd((v[0].square() + v[1].square() + v[2].square()).sqrt());
@@ -157,12 +160,18 @@ double VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest
     const auto constant = [&](std::size_t c, Index i, Index j) {
         return f.own[0][c][i] + f.own[1][c][j] + f.g12[c][i] * p2[j];
     };
+    const auto squares = [&](Index i, Index j) {
+        return ArrayXd((f.own[2][0] + (f.g13[0][i] + f.g23[0][j]) * p3 + constant(0, i, j)).square() +
+                       (f.own[2][1] + (f.g13[1][i] + f.g23[1][j]) * p3 + constant(1, i, j)).square() +
+                       (f.own[2][2] + (f.g13[2][i] + f.g23[2][j]) * p3 + constant(2, i, j)).square());
+    };
     double best = 0.0;
+    GridPlace place = {ceilings[6].first, ceilings[6].second, 0};
     const auto search = [&](Index i, Index j) {
-        const ArrayXd size2 = (f.own[2][0] + (f.g13[0][i] + f.g23[0][j]) * p3 + constant(0, i, j)).square() +
-                              (f.own[2][1] + (f.g13[1][i] + f.g23[1][j]) * p3 + constant(1, i, j)).square() +
-                              (f.own[2][2] + (f.g13[2][i] + f.g23[2][j]) * p3 + constant(2, i, j)).square();
-        best = std::max(best, std::sqrt(size2.maxCoeff()));
+        const double size = std::sqrt(squares(i, j).maxCoeff());
+        if (!(size > best)) return;
+        best = size;
+        place = {i, j, 0};
     };
     search(ceilings[6].first, ceilings[6].second);
     std::array<std::array<UpperHull, 2>, 3> hulls = {{{UpperHull(p3, f.own[2][0]), UpperHull(p3, -f.own[2][0])},
@@ -181,7 +190,16 @@ double VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest
             }
             if (std::sqrt(bound2) > best) search(i, j);
         });
-    return best;
+    squares(place[0], place[1]).maxCoeff(&place[2]);
+    const Vector3d error = grid.error(f, place), drawn = grid.error(rest, place);
+    const Vector3d along = error.stableNormalized(), found = error - drawn;
+    const Eigen::Matrix3d variance = grid.error_covariance(covariance, place);
+    row[0] = best;
+    row[found_at_largest] = along.dot(found);
+    row[opposite_at_largest] = (found - drawn).norm();
+    row[uncertainty_at_largest] = std::sqrt(std::max(along.dot(variance * along), 0.0));
+    row[variance_at_largest] = variance.trace();
+    row[variance2_at_largest] = variance.squaredNorm();
 }
 
 // Largest minus smallest value of a component of e.
@@ -249,7 +267,7 @@ double VolumeDraws::State::diagonal(const VolumeField& f, std::size_t d) const {
 
 template <class Row>
 void VolumeDraws::State::figures(const VolumeField& f, const VolumeField& rest, const double* values, Row&& row) const {
-    row[0] = largest(f, rest);
+    largest(f, rest, row);
     double mean2 = 0.0;
     for (std::size_t c = 0; c < 3; ++c) {
         mean2 += mean_square(f, c);
@@ -275,10 +293,13 @@ VolumeDraws::VolumeDraws(const Calibration& calibration, const GridPositions& po
     for (const auto& of_axis : positions)
         if (of_axis.size() < 2) throw InvalidArgument("grid: expected at least two positions an axis");
     const VolumeGrid grid(calibration, positions, tool_of(calibration, tool));
+    MatrixXd covariance = grid.covariance(calibration.covariance);
+    NormalDraws normal(covariance, seed);
     auto state = std::make_unique<State>(State{grid,
                                                grid.table(calibration_values(calibration)),
                                                {},
-                                               NormalDraws(grid.covariance(calibration.covariance), seed),
+                                               std::move(covariance),
+                                               std::move(normal),
                                                {},
                                                {},
                                                {},
@@ -299,7 +320,7 @@ VolumeDraws::VolumeDraws(VolumeDraws&&) noexcept = default;
 
 Eigen::RowVectorXd VolumeDraws::values() const {
     const State& s = *state_;
-    Eigen::RowVectorXd row(int(volume_figures.size()));
+    Eigen::RowVectorXd row(volume_columns);
     VolumeField nothing;
     s.grid.field(VectorXd::Zero(s.table.size()).eval().data(), nothing);
     s.figures(s.field, nothing, s.table.data(), row);
@@ -308,7 +329,7 @@ Eigen::RowVectorXd VolumeDraws::values() const {
 
 VolumeDraws::Figures VolumeDraws::draw(std::uint64_t first, std::size_t count) const {
     const State& s = *state_;
-    Figures result(Index(count), int(volume_figures.size()));
+    Figures result(Index(count), volume_columns);
     in_blocks(Index(count), NormalDraws::together, [&](Index begin, Index end) {
         MatrixXd tables;
         s.draws.draw(first + std::uint64_t(begin), tables);

@@ -1,5 +1,7 @@
 #include "uncertainty/volume_field.hpp"
 
+#include <Eigen/Geometry>
+
 namespace stepdiag {
 
 using Eigen::ArrayXd;
@@ -80,6 +82,39 @@ void VolumeGrid::field(const double* table, VolumeField& f) const {
         }
         if (r == 1) slopes(at, 2, f.g23);
     }
+}
+
+Eigen::Vector3d VolumeGrid::error(const VolumeField& f, const GridPlace& place) const {
+    const auto [i, j, k] = place;
+    const double p2 = position_[1][j], p3 = position_[2][k];
+    Eigen::Vector3d e;
+    for (std::size_t c = 0; c < 3; ++c)
+        e[Index(c)] =
+            f.own[0][c][i] + f.own[1][c][j] + f.own[2][c][k] + f.g12[c][i] * p2 + (f.g13[c][i] + f.g23[c][j]) * p3;
+    return e;
+}
+
+Eigen::Matrix3d VolumeGrid::error_covariance(const MatrixXd& covariance, const GridPlace& place) const {
+    std::array<Index, 18> entry;
+    Eigen::Matrix<double, 3, 18> effect = Eigen::Matrix<double, 3, 18>::Zero();
+    Eigen::Vector3d lever = tool_;  // of the rotations of an axis: from it to the functional point
+    Index first = Index(rows_.size());
+    for (std::size_t r = 3; r-- > 0;) {
+        Eigen::Vector3d own = Eigen::Vector3d::Zero();
+        own[index(order_[r])] = position_[r][place[r]];
+        const Eigen::Vector3d of_rotations = carries_workpiece_[r] ? Eigen::Vector3d(lever + own) : lever;
+        lever += own;
+        const Index n = position_[r].size();
+        first -= 6 * n;
+        for (Index c = 0; c < 3; ++c) {
+            const Index column = Index(6 * r) + c;
+            effect(c, column) = 1.0;
+            effect.col(column + 3) = Eigen::Vector3d::Unit(c).cross(of_rotations);
+            entry[std::size_t(column)] = first + c * n + place[r];
+            entry[std::size_t(column + 3)] = first + (c + 3) * n + place[r];
+        }
+    }
+    return effect * covariance(entry, entry) * effect.transpose();
 }
 
 }  // namespace stepdiag

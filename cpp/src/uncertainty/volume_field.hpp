@@ -20,6 +20,8 @@ struct VolumeField {
     Component3 g12, g13, g23;
 };
 
+using GridPlace = std::array<Eigen::Index, 3>;  // positions by rank
+
 // The points of a grid, and what the values of a calibration are there. A table has, for each axis in the order of the
 // chain, EX of all its positions, then EY, EZ, EA, EB, EC, with the squareness terms. Parameters that are missing are
 // 0.
@@ -34,6 +36,9 @@ public:
     Eigen::VectorXd table(const Eigen::VectorXd& values) const;
     Eigen::MatrixXd covariance(const Eigen::MatrixXd& of_values) const;  // of a table
     void field(const double* table, VolumeField& field) const;
+    Eigen::Vector3d error(const VolumeField& field, const GridPlace& place) const;
+    // Covariance of the error at a place, from that of a table.
+    Eigen::Matrix3d error_covariance(const Eigen::MatrixXd& covariance, const GridPlace& place) const;
     // Positions by components of one axis, in a table.
     Eigen::Map<const Eigen::MatrixXd> functions(const double* table, std::size_t rank) const;
 

@@ -37,6 +37,7 @@ SQUARENESS_OF: Final[Mapping[str, tuple[str, ...]]] = {"X": (), "Y": ("C0Y",), "
 TWO_SIDED: Final = NormalDist().inv_cdf(0.975)
 ONE_SIDED: Final = NormalDist().inv_cdf(0.95)
 FEWEST_SAMPLES: Final = 1000
+DRAWS_BETWEEN: Final = 1000  # of what lies between the nodes; its 95 % quantile is good to a tenth of its uncertainty
 MOST_NODES: Final = 201  # of an axis that are computed; 8 million points in a tenth of a second
 MOST_DRAWN: Final = 51  # positions an axis; more take much longer and change little
 # Lengths that differ by less were rounded on the way, mm.
@@ -63,6 +64,24 @@ class VolumeFigure:
     interval: Interval | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class ChosenPlaces:
+    """What the bounds of the largest error rest on. Draws add noise to the values of a calibration; each chooses the
+    place and the direction of its largest error. Arrays (n,) have a number for each draw, after that of the
+    calibration itself; mm.
+
+    Of the calibration's error e at that place, with the covariance V: e along the direction, the length of e less the
+    noise that chose, the standard uncertainty along the direction, and the traces of V and V V. raised: the largest
+    error with draws of what lies between the nodes, less that without, (m,); empty where nothing does."""
+
+    found: FloatArray
+    opposite: FloatArray
+    u: FloatArray
+    variance: FloatArray
+    variance2: FloatArray
+    raised: FloatArray
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class VolumeErrors(Displayed):
     """Errors of the functional point and tilts of the tool over a box of commanded positions."""
@@ -75,8 +94,8 @@ class VolumeErrors(Displayed):
     largest: float  # mm; NaN where a parameter that acts in it is not determined, as all figures
     largest_at: FloatArray  # (3,) commanded, mm
     largest_components: FloatArray  # (3,) dx, dy, dz, mm
-    largest_spread: Spread | None  # its bias and standard uncertainty without between_nodes, mm
-    largest_interval: Interval | None  # 95 %, with between_nodes; None without a covariance, as all intervals
+    largest_chosen: ChosenPlaces | None  # None without a covariance, and where the largest error is not known
+    largest_interval: Interval | None  # 95 % or more, with between_nodes; None without a covariance, as all intervals
     rms: float  # root of the mean of |e|^2 over the box, mm
     rms_interval: Interval | None
     ranges: Mapping[str, VolumeFigure]  # "X", "Y", "Z": largest minus smallest component, mm
@@ -86,7 +105,7 @@ class VolumeErrors(Displayed):
     missing: Mapping[str, tuple[str, ...]]  # "X" ... "C" -> parameters that act in it and are not determined
     between_nodes: float  # standard uncertainty of the largest error by what lies between the nodes, mm
     between_nodes_estimated: bool  # from second differences of the tables; else it was stated
-    bounds: Interval | None  # of the largest error, mm: it is above the first, and below the second, with 95 % each
+    bounds: Interval | None  # of the largest error, mm: above the first, below the second, with 95 % or more each
     limit: float | None  # mm
     verdict: Verdict | None  # None without a limit, without a covariance, or where the largest error is not known
     no_verdict_because: str  # why there is none although there is a limit; else empty
@@ -100,11 +119,22 @@ class VolumeErrors(Displayed):
         x, y, z = (len(positions) for positions in self.grid)
         return x, y, z
 
+    @property
+    def interval_note(self) -> str:
+        """Why there is a verdict although the limit is in `largest_interval`; else empty."""
+        if self.limit is None or self.verdict in (None, "undecided") or self.largest_interval is None:
+            return ""
+        low, high = self.largest_interval
+        if not low <= self.limit <= high:
+            return ""
+        return "the limit is in the 95 % interval: that leaves 2.5 % on each side, the verdict 5 % on one"
+
     def _facts(self) -> Facts:
         low, high = self.largest_interval or (float("nan"), float("nan"))
         interval = "" if self.largest_interval is None else f", 95 % interval {low * 1e3:.3g} to {high * 1e3:.3g} µm"
         facts = [("verdict", f"{self.verdict}, limit {self.limit * 1e3:g} µm")] if self.verdict and self.limit else []
         facts += [("no verdict because", self.no_verdict_because)] if self.no_verdict_because else []
+        facts += [("verdict and interval", self.interval_note)] if self.interval_note else []
         facts += [
             ("largest", f"{self.largest * 1e3:.4g} µm at {point_text(self.largest_at)}{interval}"),
             ("rms", f"{self.rms * 1e3:.4g} µm"),
@@ -163,13 +193,18 @@ def volume_errors(
     for name in values:
         if not (known if name in ("largest", "rms", *DIAGONALS) else name[-1] not in missing):
             values[name] = math.nan
-    spreads = {}
+    spreads, chosen = {}, None
     if isinstance(source, Calibration) and source.covariance is not None:
-        spreads = _spreads(source, offset, positions, samples, seed, progress)
+        drawn_at = tuple(_thinned(axis, MOST_DRAWN) for axis in positions)
+        draws = _core.VolumeDraws(source, *drawn_at, tool=offset, seed=seed)
+        drawn = _drawn(draws, samples, progress)
+        spreads = _spreads(draws, drawn)
         if known:
-            along = _uncertainty_along(source, offset, found)
-            bias, u = spreads["largest"]
-            spreads["largest"] = bias, max(u, along)
+            whole = all(len(some) == len(every) for some, every in zip(drawn_at, positions, strict=True))
+            there = found if whole else _core.summarise_volume(machine, *drawn_at, tilts=False)
+            chosen = _chosen(found.largest, there.largest, draws.values, drawn)
+            if between > 0.0:
+                chosen = replace(chosen, raised=_raised(source, offset, drawn_at, between, seed))
     figures = {name: VolumeFigure(value, _interval(value, spreads.get(name))) for name, value in values.items()}
     nowhere = np.full(3, np.nan)
     not_judged = VolumeErrors(
@@ -181,7 +216,7 @@ def volume_errors(
         largest=figures["largest"].value,
         largest_at=found.largest_at if known else nowhere,
         largest_components=found.components if known else nowhere,
-        largest_spread=spreads.get("largest"),
+        largest_chosen=chosen,
         largest_interval=None,
         rms=figures["rms"].value,
         rms_interval=figures["rms"].interval,
@@ -200,21 +235,23 @@ def volume_errors(
         ranking=_ranking(source, machine, positions) if known and ranking else (),
         fit=source.fit if isinstance(source, Calibration) else None,
     )
-    return judged(not_judged, limit=limit, between_nodes=between)
+    return judged(not_judged, limit=limit)
 
 
-def judged(found: VolumeErrors, *, limit: float | None, between_nodes: float) -> VolumeErrors:
-    """The same figures with this standard uncertainty by what lies between the nodes, beside this limit; mm."""
-    spread = None
-    if found.largest_spread is not None:
-        bias, u = found.largest_spread
-        spread = bias, math.hypot(u, between_nodes)
-    bounds = _interval(found.largest, spread, ONE_SIDED)
+def without_between_nodes(found: VolumeErrors) -> VolumeErrors:
+    """The same figures, without a limit, as if nothing lay between the nodes."""
+    chosen = found.largest_chosen
+    kept = None if chosen is None else replace(chosen, raised=np.zeros(0))
+    return judged(replace(found, largest_chosen=kept, between_nodes=0.0), limit=None)
+
+
+def judged(found: VolumeErrors, *, limit: float | None) -> VolumeErrors:
+    """The same figures beside this limit, mm."""
+    bounds = _bounds(found.largest_chosen, found.between_nodes, 0.95)
     verdict, why = _verdict(found.source, limit, bounds, found.missing)
     return replace(
         found,
-        between_nodes=between_nodes,
-        largest_interval=_interval(found.largest, spread),
+        largest_interval=_bounds(found.largest_chosen, found.between_nodes, 0.975),
         bounds=bounds,
         limit=limit,
         verdict=verdict,
@@ -362,17 +399,10 @@ def _thinned(positions: FloatArray, most: int) -> FloatArray:
     return kept
 
 
-def _spreads(
-    calibration: Calibration,
-    tool: FloatArray,
-    grid: tuple[FloatArray, FloatArray, FloatArray],
-    samples: int,
-    seed: int,
-    progress: Callable[[int, int], None] | None,
-) -> dict[str, Spread]:
-    """Of every figure its bias and its standard uncertainty, from draws of the covariance."""
-    drawn_at = [_thinned(positions, MOST_DRAWN) for positions in grid]
-    draws = _core.VolumeDraws(calibration, *drawn_at, tool=tool, seed=seed)
+def _drawn(
+    draws: _core.VolumeDraws, samples: int, progress: Callable[[int, int], None] | None
+) -> npt.NDArray[np.float64]:
+    """So many draws, in parts."""
     parts, done = [], 0
     while done < samples:
         count = min(1000, samples - done)
@@ -380,35 +410,81 @@ def _spreads(
         done += count
         if progress is not None:
             progress(done, samples)
-    drawn = np.concatenate(parts)
+    return np.concatenate(parts)
+
+
+def _spreads(draws: _core.VolumeDraws, drawn: FloatArray) -> dict[str, Spread]:
+    """Of the figures their biases and standard uncertainties. Those of the largest error do not follow from them."""
     bias = drawn.mean(axis=0) - draws.values
     # A bias is known to about half of itself: that of the true errors is not that of the errors found.
     u = np.hypot(drawn.std(axis=0, ddof=1), 0.5 * bias)
-    return {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names(), bias, u, strict=True)}
+    spreads = {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names(), bias, u, strict=False)}
+    del spreads["largest"]
+    return spreads
 
 
-def _uncertainty_along(calibration: Calibration, tool: FloatArray, found: _core.VolumeSummary) -> float:
-    """Standard uncertainty of the largest error at its own place, along its own direction.
+def _chosen(largest: float, largest_where_drawn: float, own: FloatArray, drawn: FloatArray) -> ChosenPlaces:
+    """The places that draws choose; largest: of all positions, and of those where errors are drawn; own: a draw of
+    nothing."""
+    rows = np.concatenate([own[None], drawn])
+    # Draws are of first order, the largest error is exact.
+    found, opposite = rows[:, -5:-3].T + (largest_where_drawn - own[0])
+    found[0] = largest
+    u, variance, variance2 = rows[:, -3:].T
+    return ChosenPlaces(found, opposite, u, variance, variance2, raised=np.zeros(0))
 
-    Where places compete for the largest error, the largest of them scatters less than any of them, but its place does
-    not tell which one is the largest in truth."""
-    there = _core.error_at_point(calibration, found.largest_at, tool=tool).covariance[:3, :3]
-    direction = found.components / found.largest if found.largest > 0.0 else np.zeros(3)
-    return math.sqrt(max(float(direction @ there @ direction), 0.0))
+
+def _raised(
+    calibration: Calibration, tool: FloatArray, grid: Sequence[FloatArray], between: float, seed: int
+) -> FloatArray:
+    """What lies between the nodes adds to the largest error in draws of it, mm.
+
+    A third of the variance is that of each axis. The largest error finds the middles of intervals, where a parabola is
+    sqrt(15/8) times its root mean square."""
+    moves = np.array([name[:2] in ("EX", "EY", "EZ") for name, _ in calibration.covariance_labels])
+    only = _core.with_covariance(calibration, np.diag(15.0 / 8.0 * between**2 / 3.0 * moves))
+    draws = _core.VolumeDraws(only, *grid, tool=tool, seed=seed)
+    raised: FloatArray = draws.draw(0, DRAWS_BETWEEN)[:, 0] - draws.values[0]
+    return raised
 
 
-def _interval(value: float, spread: Spread | None, factor: float = TWO_SIDED) -> Interval | None:
-    """The value less its bias, plus and minus a multiple of its standard uncertainty; not below 0."""
+def _interval(value: float, spread: Spread | None) -> Interval | None:
+    """The value less its bias, plus and minus its expanded uncertainty; not below 0."""
     if spread is None or math.isnan(value):
         return None
     bias, u = spread
-    return max(value - bias - factor * u, 0.0), max(value - bias + factor * u, 0.0)
+    return max(value - bias - TWO_SIDED * u, 0.0), max(value - bias + TWO_SIDED * u, 0.0)
+
+
+def _bounds(chosen: ChosenPlaces | None, between_nodes: float, probability: float) -> Interval | None:
+    """Of the largest error: it is above the first and below the second with so much probability, each; not below 0.
+
+    Above: the largest that any place may have along any direction. The largest error found is at least that of the
+    place and the direction where the true one is largest, so that none needs a correction for being chosen. Below: the
+    places that draws choose, by values that have the opposite noise, of which the choice does not tell anything. The
+    square of a length |e| that is found has the expectation |e|^2 + tr V and the variance 4 |e|^2 u^2 + 2 tr V V.
+    docs/volume.md has the reasons."""
+    if chosen is None:
+        return None
+    factor = NormalDist().inv_cdf(probability)
+    high = float(np.max(chosen.found + factor * chosen.u))
+    if len(chosen.raised):
+        mean = max(float(np.mean(chosen.raised)), 0.0)
+        most = float(np.quantile(chosen.raised, probability)) - mean
+        own = float(chosen.found[0])
+        high = own + mean + math.hypot(high - own, most)
+    # Draws: noise of twice the variance. What lies between the nodes may be of any sign.
+    low2 = max(float(np.mean(chosen.opposite[1:] ** 2 - 2.0 * chosen.variance[1:])), 0.0)
+    u2, variance, variance2 = (float(np.mean(x[1:])) for x in (chosen.u**2, chosen.variance, chosen.variance2))
+    variance2 += 2.0 * between_nodes**2 * variance + 3.0 * between_nodes**4
+    spread = math.sqrt(4.0 * low2 * (u2 + between_nodes**2) + 2.0 * variance2)
+    return math.sqrt(max(low2 - factor * spread, 0.0)), high
 
 
 def _verdict(
     source: Calibration | Machine, limit: float | None, bounds: Interval | None, missing: Mapping[str, object]
 ) -> tuple[Verdict | None, str]:
-    """By the guard band of ISO 14253-1: a verdict is certain to 95 %; and why there is none."""
+    """By the guard band of ISO 14253-1: a verdict is wrong with at most 5 %; and why there is none."""
     if limit is None:
         return None, ""
     if isinstance(source, Calibration) and source.fit == "rejected":

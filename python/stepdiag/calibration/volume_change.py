@@ -9,7 +9,7 @@ import numpy as np
 from stepdiag._core import Calibration, ErrorMap, Machine
 from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.volume import Interval, VolumeErrors, judged, volume_errors
+from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors, without_between_nodes
 from stepdiag.display import Displayed, Facts
 
 ChangeVerdict = Literal["improved", "worse", "cannot be told"]
@@ -79,7 +79,7 @@ def volume_change(comparison: Comparison) -> VolumeChange:
     one, other = comparison.a, comparison.b
     a, b = (volume_errors(each, tool=one.tool, ranking=False) for each in (one, other))
     reason = _no_verdict(comparison, a, b)
-    known_a, known_b = (judged(each, limit=None, between_nodes=0.0).largest_interval for each in (a, b))
+    known_a, known_b = (without_between_nodes(each).largest_interval for each in (a, b))
     return VolumeChange(
         one.tool,
         a,

@@ -105,4 +105,6 @@ def _facts(found: VolumeErrors) -> str:
     )
     if found.limit is not None and found.verdict is not None:
         text += f"; {found.verdict} the limit of {1e3 * found.limit:g} µm"
+    if found.interval_note:
+        text += f" ({found.interval_note})"
     return text

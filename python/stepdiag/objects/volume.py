@@ -57,11 +57,11 @@ class VolumeObject(TypedDict):
     for the reason below"""
     no_verdict_because: str | None
     bounds_um: list[float | None] | None
-    """The largest error is above the first with 95 %, and below the second with 95 %."""
+    """The largest error is above the first, and below the second, with 95 % or more each: the verdict's bounds."""
     largest_um: float | None
     """null: parameters are not determined"""
     interval_um: list[float | None] | None
-    """95 %, of the largest error, with what lies between the nodes."""
+    """95 % or more, of the largest error, with what lies between the nodes: 2.5 % at most beyond each end."""
     at_mm: list[float] | None
     """Commanded position of the largest error."""
     components_um: list[float | None]

@@ -52,7 +52,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     if contents.before is not None and change is not None:
         before = ErrorInVolume(change.a, *error_grid(contents.before))
     if change is not None and np.array_equal(change.tool, calibration.tool):  # there already; without its ranking
-        figures_after = judged(change.b, limit=request.limit, between_nodes=change.b.between_nodes)
+        figures_after = judged(change.b, limit=request.limit)
         found = ErrorInVolume(figures_after, *error_grid(calibration))
     else:
         found = error_in_volume(calibration, request.limit)

@@ -205,6 +205,8 @@ def _within(figures: VolumeErrors) -> tuple[str, object]:
                 f"The largest error is above {above} and below {below} (95 % each).",
             ),
         }[figures.verdict]
+    if figures.interval_note:
+        why += f" {_sentence(figures.interval_note)}"
     if figures.verdict is not None and figures.fit != "accepted":
         why += f" {_RESTS_ON[figures.fit]}"
         verdict += f" ({figures.fit or 'validity not known'})"

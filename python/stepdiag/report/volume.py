@@ -59,6 +59,8 @@ def _verdict_rows(found: VolumeErrors) -> Iterator[str]:
         "not within": f"machine: not within {limit}: the largest error is above {above} (95 %)",
         "undecided": f"machine: undecided at {limit}: the largest error is above {above}, below {below} (95 % each)",
     }[found.verdict]
+    if found.interval_note:
+        yield f"  {found.interval_note}"
     if not is_first:
         yield of_calibration
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "stepdiag/uncertainty/derived.hpp"
 #include "uncertainty/normal_draws.hpp"
 #include "uncertainty/volume_field.hpp"
 
@@ -82,6 +83,7 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                 const Machine machine = machine_of(calibration.chain, grid, table);
                 Vector3d low = Vector3d::Constant(1e9), high = -low;
                 double largest = 0.0, mean2 = 0.0;
+                Vector3d worst, there;
                 std::array<std::vector<double>, 3> weights;
                 for (std::size_t a = 0; a < 3; ++a) weights[a] = trapezoidal_weights(positions[a]);
                 for (std::size_t i = 0; i < positions[0].size(); ++i)
@@ -89,7 +91,11 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                         for (std::size_t k = 0; k < positions[2].size(); ++k) {
                             const Vector3d e =
                                 machine.first_order_error({positions[0][i], positions[1][j], positions[2][k]});
-                            largest = std::max(largest, e.norm());
+                            if (e.norm() > largest) {
+                                largest = e.norm();
+                                worst = {positions[0][i], positions[1][j], positions[2][k]};
+                                there = e;
+                            }
                             mean2 += weights[0][i] * weights[1][j] * weights[2][k] * e.squaredNorm();
                             low = low.cwiseMin(e);
                             high = high.cwiseMax(e);
@@ -99,6 +105,18 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                 EXPECT_NEAR(found(draw, 0), largest, close) << chain << noise;
                 EXPECT_NEAR(found(draw, 1), std::sqrt(mean2), close) << chain << noise;
                 for (int c = 0; c < 3; ++c) EXPECT_NEAR(found(draw, 2 + c), high[c] - low[c], close) << chain << noise;
+                const Machine own = machine_of(calibration.chain, grid, grid.table(calibration_values(calibration)));
+                const Vector3d e = own.first_order_error(worst);
+                const Vector3d along = there / largest;
+                EXPECT_NEAR(found(draw, found_at_largest), along.dot(e), close);
+                EXPECT_NEAR(found(draw, opposite_at_largest), (2.0 * e - there).norm(), close);
+                const Eigen::Matrix3d covariance =
+                    error_at_point(calibration, worst, tool).covariance.topLeftCorner<3, 3>();
+                const double variance = covariance.trace();
+                EXPECT_NEAR(std::pow(found(draw, uncertainty_at_largest), 2), along.dot(covariance * along),
+                            1e-12 * variance);
+                EXPECT_NEAR(found(draw, variance_at_largest), variance, 1e-12 * variance);
+                EXPECT_NEAR(found(draw, variance2_at_largest), covariance.squaredNorm(), 1e-12 * variance * variance);
             }
         }
 }

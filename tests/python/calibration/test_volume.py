@@ -215,7 +215,7 @@ def certain() -> sd.Calibration:
 
 def test_draws_are_the_exact_figures_of_drawn_tables(certain: sd.Calibration) -> None:
     found = sd.volume_errors(certain, ranking=False)
-    values = _core.VolumeDraws(certain, *found.grid).values
+    values = _core.VolumeDraws(certain, *found.grid).values[: len(_core.VolumeDraws.names())]
     figures = [
         found.largest,
         found.rms,
@@ -272,12 +272,90 @@ def test_what_lies_between_the_nodes_widens_interval_and_bounds(certain: sd.Cali
     wide = sd.volume_errors(certain, ranking=False, between_nodes=1.0)
     assert narrow.largest_interval is not None
     assert wide.largest_interval is not None
+    assert narrow.bounds is not None
     assert wide.bounds is not None
-    half = 0.5 * (narrow.largest_interval[1] - narrow.largest_interval[0]) / 1.959964
-    middle = 0.5 * sum(narrow.largest_interval)
-    assert wide.largest_interval[1] == pytest.approx(middle + 1.959964 * np.hypot(half, 1.0), rel=1e-6)
-    assert wide.bounds[1] == pytest.approx(middle + 1.644854 * np.hypot(half, 1.0), rel=1e-6)
+    # One place alone would be raised by 1.645 times the parabola's largest, sqrt(15/8) of its root mean square.
+    assert wide.bounds[1] > narrow.largest + 1.644854 * np.sqrt(15.0 / 8.0)
+    assert wide.largest_interval[1] > wide.bounds[1]
+    assert wide.bounds[0] < narrow.bounds[0]
     assert wide.rms_interval == narrow.rms_interval
+
+
+def bounds_of_places(errors: npt.NDArray[np.float64], u: npt.NDArray[np.float64], runs: int) -> npt.NDArray[np.float64]:
+    """95 % bounds of the largest error by runs with noise, (runs, 2), mm. errors: of X, at the nodes of X from home."""
+    nodes, ends = np.linspace(0.0, VOLUME[0], len(errors)), np.array([0.0, 50.0])
+    zeros = {name: np.zeros(len(errors) if name[2] == "X" else 2) for name in FUNCTIONS}
+    at = sum(len(zeros[name]) for name in FUNCTIONS[: FUNCTIONS.index("EXX")])
+    covariance = np.zeros((sum(map(len, zeros.values())) + 3,) * 2)
+    covariance[at : at + len(u), at : at + len(u)] = np.diag(u**2)
+    random, bounds = np.random.default_rng(1), []
+    for seed in range(runs):
+        values = zeros | {"EXX": errors + u * random.standard_normal(len(u))}
+        functions = {
+            name: (nodes if name[2] == "X" else ends, value, u if name == "EXX" else 0.0 * value)
+            for name, value in values.items()
+        }
+        calibration = sd.Calibration(
+            method="adjustment",
+            chain=CHAIN,
+            volume=(VOLUME[0], 50.0, 50.0),
+            tool=(0.0, 0.0, 0.0),
+            functions=functions,
+            squareness=dict.fromkeys(SQUARENESSES, (0.0, 0.0)),
+            covariance=covariance,
+        )
+        found = sd.volume_errors(calibration, between_nodes=0.0, ranking=False, samples=1000, seed=seed)
+        assert found.bounds is not None
+        bounds.append(found.bounds)
+    return np.array(bounds)
+
+
+RUNS = 300
+# 5 % and three binomial standard deviations of 300 runs: a sound rule at exactly 5 % fails once in 700 seeds.
+ALLOWED = 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / RUNS)
+
+
+def test_among_equal_places_not_within_is_wrong_in_five_percent_at_most() -> None:
+    errors = np.append(0.0, np.full(8, 10e-3))
+    bounds = bounds_of_places(errors, np.append(0.0, np.full(8, 0.5e-3)), RUNS)
+    assert np.mean(bounds[:, 0] > 10e-3) <= ALLOWED
+    assert np.mean(bounds[:, 1] < 10e-3) <= ALLOWED
+
+
+def test_a_place_that_is_less_certain_than_the_largest_found_counts() -> None:
+    """Within is wrong if the place at 10 um is found below the one at 9 um, which says little of it."""
+    bounds = bounds_of_places(np.array([0.0, 9e-3, 10e-3]), np.array([0.0, 0.1e-3, 1e-3]), RUNS)
+    assert np.mean(bounds[:, 1] < 10e-3) <= ALLOWED
+    assert np.mean(bounds[:, 0] > 10e-3) <= ALLOWED
+
+
+def test_where_noise_dominates_not_within_is_wrong_in_five_percent_at_most() -> None:
+    errors = np.append(0.0, 1e-3 * (-1.0) ** np.arange(8))
+    bounds = bounds_of_places(errors, np.append(0.0, np.full(8, 2e-3)), RUNS)
+    assert np.mean(bounds[:, 0] > 1e-3) <= ALLOWED
+    assert np.mean(bounds[:, 1] < 1e-3) <= ALLOWED
+
+
+def test_one_place_has_the_bounds_of_a_normal_distribution() -> None:
+    bounds = bounds_of_places(np.array([0.0, 0.01]), np.array([0.0, 1e-4]), 1)[0]
+    # 10 um and noise of u = 0.1 um: the second normal number of the seed, as the first is of the node at home.
+    found = 0.01 + 1e-4 * np.random.default_rng(1).standard_normal(2)[1]
+    assert bounds[1] == pytest.approx(found + 1.644854e-4, abs=1e-9)
+    # The lower one has the mean of 1000 squares: noise of 2 u/sqrt(1000), and second order, u^2/L, of 1 % of u.
+    assert bounds[0] == pytest.approx(found - 1.644854e-4, abs=0.25e-4)
+
+
+def test_limit_inside_the_interval_of_a_verdict_is_explained(certain: sd.Calibration) -> None:
+    found = sd.volume_errors(certain, ranking=False)
+    assert found.bounds is not None
+    assert found.largest_interval is not None
+    limit = 0.5 * (found.bounds[1] + found.largest_interval[1])
+    near, far = (sd.volume_errors(certain, ranking=False, limit=factor * limit) for factor in (1.0, 2.0))
+    assert (near.verdict, far.verdict) == ("within", "within")
+    assert near.interval_note
+    assert any(near.interval_note in row for row in volume_report(near))
+    assert not far.interval_note
+    assert not found.interval_note
 
 
 def test_between_nodes_is_what_the_calibration_carries_unless_it_is_told(certain: sd.Calibration) -> None:
