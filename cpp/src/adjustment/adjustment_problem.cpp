@@ -141,7 +141,7 @@ double usual_angle(const Plan& plan, const std::map<std::string, LineReadings>& 
 }
 
 // By how much two readings that determine the same thing may differ in their uncertainties, so that the normal
-// equations still tell what only the worse one says from what none does (rank_decision.hpp): measured, with 8 and 50
+// equations still tell what only the worse one says from what none does (gauss_newton.hpp): measured, with 8 and 50
 // steps, three heads.
 constexpr double widest_weights = 3e4;
 // Of beams with unknown constants: with more, steps crawl along a valley, and compilers decide whether they arrive.

@@ -167,11 +167,30 @@ TEST(Adjustment, FindsAndNamesReadingsThatDoNotFit) {
         // The distance of the same point on another line fits as badly.
         EXPECT_EQ(found.members.size(), found.members.front().channel == "distance" ? 2u : 1u);
     }
-    EXPECT_EQ(result.verdict.fit, stepdiag::Fit::accepted);
+    // Without both distances of its step nothing knows the machine there.
+    EXPECT_EQ(result.verdict.fit, stepdiag::Fit::doubtful);
+    EXPECT_EQ(result.verdict.reasons.front().finding, stepdiag::FitFinding::undetermined);
     EXPECT_GT(result.chi_square_probability, 1e-3);
     AdjustmentOptions keep;
     keep.outlier_probability = 0.0;
+    keep.variance_components = false;
     EXPECT_LT(shop.adjust(spoilt, keep).chi_square_probability, 1e-6);
+}
+
+TEST(Adjustment, WeighsAChannelThatScattersMoreThanStated) {
+    Workshop shop;
+    auto options = shop.simulation();
+    options.noise = {2.0e-3, 1e-6, 0.0, 5};
+    const Adjustment result = shop.adjust(simulate(shop.machine(), shop.plan(), shop.head, options));
+    EXPECT_EQ(result.verdict.fit, stepdiag::Fit::rejected);
+    ASSERT_EQ(result.verdict.reasons.size(), 1u);
+    EXPECT_EQ(result.verdict.reasons.front().finding, stepdiag::FitFinding::noise_factor);
+    EXPECT_TRUE(result.faults.empty());
+    for (const stepdiag::VarianceComponent& each : result.variance_components) {
+        const double simulated = each.noise.channel == "distance" ? 20.0 : 1.0;  // of 0.1 um
+        EXPECT_EQ(each.used, simulated > 1.0) << each.noise.channel;
+        EXPECT_NEAR(each.noise.factor, simulated, 3.0 * each.standard_uncertainty) << each.noise.channel;
+    }
 }
 
 TEST(Adjustment, IsJudgedWithWhatWasFoundBesideIt) {

@@ -62,6 +62,7 @@ struct Workshop {
     double square_sum(const Measurement& run) const {
         AdjustmentOptions keep = options;
         keep.outlier_probability = 0.0;
+        keep.variance_components = false;
         return adjust(run, plan(), machine().chain(), Vector3d(20, -10, 50), stepdiag::Head{}.calibration(), keep)
             .weighted_square_sum;
     }
