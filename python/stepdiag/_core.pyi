@@ -1500,6 +1500,11 @@ class Thresholds:
         Least gain of a fault in chi-square.
         """
     @property
+    def faults_of_mistake(self) -> float:
+        """
+        Number of faults from which one mistake that explains as much is the likelier.
+        """
+    @property
     def found_with_99_percent(self) -> float:
         """
         Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.
@@ -1518,6 +1523,11 @@ class Thresholds:
     def largest_variance_factor(self) -> float:
         """
         Square of largest_noise_factor.
+        """
+    @property
+    def lines_of_mistake(self) -> float:
+        """
+        The same of lines that have faults.
         """
     @property
     def misfit_doubtful(self) -> float:

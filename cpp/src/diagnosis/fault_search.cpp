@@ -145,7 +145,7 @@ FaultSearch::Tested FaultSearch::test(Solution& solution, const Eigen::VectorXd&
 
 const FaultTests& FaultSearch::tests(Solution& solution) {
     const bool solved_again = options_.smoothness && options_.smoothness->cross_validated;
-    if (!last_ || solved_again) {
+    if (!last_ || last_->at.get() != &solution || solved_again) {  // rounds may end at another solution
         auto hypotheses = std::make_unique<FaultHypotheses>(solution.problem());
         auto tests = std::make_unique<FaultTests>(solution.solver().equations(), solution.solver().factor(),
                                                   solution.inverse(), solution.reading_variances(), *hypotheses);
@@ -273,6 +273,7 @@ bool FaultSearch::find_more(SolutionPointer& solution) {
     for (int step = 0; step < 4 * most_; ++step) {
         explain_by_fewer(solution);
         last_ = std::make_shared<Tested>(test(*solution, solution->x()));
+        last_->at = solution;
         const Tested& tested = *last_;
         const auto next = worst(tested);
         // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
