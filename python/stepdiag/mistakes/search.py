@@ -60,8 +60,8 @@ class FoundMistake:
     variance_factor_before: with it; None where the readings could not be adjusted.
     alternatives: of the first of a list: how many more there are that the readings do not tell from it, and that are
     not in the list.
-    or_faults: the faults of readings that the adjustment found explain as much, and are so few, on so few lines, that
-    they are as likely."""
+    or_faults: the faults of readings that the adjustment found explain as much, and are as likely: they are few, on few
+    lines, and the mistake has a number that was chosen for the fit, as they have."""
 
     entry: str
     text: str
@@ -316,7 +316,9 @@ class MistakeSearch:
         found = [one for one in adjusted if one is not None]
         if found:
             more, by_faults = max(0, len(alike) - MOST_ADJUSTED), self._left_by_faults(factor)
-            or_faults = by_faults - best < ALTERNATIVE and not self._has_unlikely_faults()
+            # What explains as much without a number of its own does so by no chance.
+            is_as_likely = first.hypothesis.free > 0.0 and not self._has_unlikely_faults()
+            or_faults = by_faults - best < ALTERNATIVE and is_as_likely
             found[0] = replace(found[0], alternatives=more, or_faults=or_faults)
         return found
 
