@@ -117,6 +117,9 @@ void bind_thresholds(py::module_& m) {
     add("gross_scatter", &Thresholds::gross_scatter, "Of the square sum a reading: values far from any machine.");
     add("mistake", &Thresholds::mistake, "Least gain of a mistake in the whole run.");
     add("chance", &Thresholds::chance, "Difference in chi-square that does not make one mistake better than another.");
+    add("faults_of_mistake", &Thresholds::faults_of_mistake,
+        "Number of faults from which one mistake that explains as much is the likelier.");
+    add("lines_of_mistake", &Thresholds::lines_of_mistake, "The same of lines that have faults.");
     add("found_with_99_percent", &Thresholds::found_with_99_percent,
         "Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.");
     bound.def_property_readonly("largest_variance_factor", &Thresholds::largest_variance_factor,

@@ -304,6 +304,33 @@ def _reversed(entry: str, copy: Copy) -> Hypotheses:
             )
 
 
+def _axes_reversed(entry: str, copy: Copy) -> Hypotheses:
+    """All lines with the names of their mirror images; scale lines, which are mostly measured by themselves, too or
+    not."""
+    plan, opposite, seen = copy.known.plan, str.maketrans("pn", "np"), list[dict[str, str]]()
+    for count in (1, 2, 3):
+        for axes in combinations("XYZ", count):
+            for of_scales in (False, True) if plan.scale_lines else (False,):
+                lines = all_lines(copy.known) if of_scales else plan.lines
+                names = {
+                    line: "".join(s.translate(opposite) if a in axes else s for a, s in zip("XYZ", line, strict=True))
+                    for line in lines
+                }
+                names = {line: name for line, name in names.items() if name != line}
+                if len(names) < 2 or names in seen:  # one line is one that is reversed
+                    continue
+                seen.append(names)
+                scales = " (scale lines too)" if of_scales else " (scale lines not)" if plan.scale_lines else ""
+                renamed = ", ".join(f"{name} in place of {line}" for line, name in names.items())
+                yield Hypothesis(
+                    entry,
+                    f"lines have the names of their mirror images, as if {_both(axes)} ran the other way{scales}: "
+                    f"{next(iter(names))} was measured as {next(iter(names.values()))}",
+                    f"in [plan] and in the run write {renamed}, and take the positions of these lines into the run",
+                    with_plan(names=names),
+                )
+
+
 def _orders(entry: str, copy: Copy) -> Hypotheses:
     stated = copy.known.plan.orders
     for order in map("".join, permutations("XYZ")):
@@ -494,6 +521,7 @@ CATALOGUE: Final = (
     Mistake("factor", _factors),
     Mistake("lines exchanged", _lines_exchanged),
     Mistake("reversed", _reversed),
+    Mistake("axes reversed", _axes_reversed),
     Mistake("order", _orders),
     Mistake("chain", _chains),
     Mistake("other head", _other_heads),

@@ -34,6 +34,8 @@ CLEAR: Final = _core.thresholds.mistake
 ALTERNATIVE: Final = _core.thresholds.alternative
 CHANCE: Final = _core.thresholds.chance
 FAULT: Final = _core.thresholds.fault
+FAULTS_OF_MISTAKE: Final = _core.thresholds.faults_of_mistake
+LINES_OF_MISTAKE: Final = _core.thresholds.lines_of_mistake
 CREDIBLE: Final = _core.thresholds.largest_variance_factor  # above it: not worth an exact adjustment
 PROMISING: Final = 36.0  # after the screening: what is above is not below `CREDIBLE` at its minimum
 MOST_ADJUSTED: Final = 4
@@ -58,7 +60,8 @@ class FoundMistake:
     variance_factor_before: with it; None where the readings could not be adjusted.
     alternatives: of the first of a list: how many more there are that the readings do not tell from it, and that are
     not in the list.
-    or_faults: the faults of readings that the adjustment found explain as much."""
+    or_faults: the faults of readings that the adjustment found explain as much, and are as likely: they are few, on few
+    lines, and the mistake has a number that was chosen for the fit, as they have."""
 
     entry: str
     text: str
@@ -313,7 +316,10 @@ class MistakeSearch:
         found = [one for one in adjusted if one is not None]
         if found:
             more, by_faults = max(0, len(alike) - MOST_ADJUSTED), self._left_by_faults(factor)
-            found[0] = replace(found[0], alternatives=more, or_faults=by_faults - best < ALTERNATIVE)
+            # What explains as much without a number of its own does so by no chance.
+            is_as_likely = first.hypothesis.free > 0.0 and not self._has_unlikely_faults()
+            or_faults = by_faults - best < ALTERNATIVE and is_as_likely
+            found[0] = replace(found[0], alternatives=more, or_faults=or_faults)
         return found
 
     def _left_by_faults(self, factor: float) -> float:
@@ -322,6 +328,12 @@ class MistakeSearch:
         if adjustment is None or not adjustment.faults:
             return math.inf
         return _Fit(adjustment.weighted_square_sum, adjustment.degrees_of_freedom).excess(factor)
+
+    def _has_unlikely_faults(self) -> bool:
+        """Whether one mistake is likelier than the faults that the adjustment found in its place."""
+        faults = self._adjustment.faults if self._adjustment else []
+        lines = {found.members[0].line for found in faults}
+        return len(faults) >= FAULTS_OF_MISTAKE or len(lines) >= LINES_OF_MISTAKE
 
     def _is_explained_by_faults(self, best: float, factor: float, *, last: bool) -> bool:
         """Whether the faults that the adjustment found explain as much."""

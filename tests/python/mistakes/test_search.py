@@ -66,7 +66,8 @@ def test_mistakes_that_act_alike_are_named_together() -> None:
     run = simulated(scenario, seed=5)
     channels = run.channels
     found = sd.find_mistakes(scenario, changed(run, {"d2": channels["d3"], "d3": channels["d2"]}))
-    assert [one.entry for one in found] == ["exchanged", "mirrored"]
+    # So is one of the lines: distances alone do not tell which hand the frame has.
+    assert [one.entry for one in found] == ["exchanged", "mirrored", "axes reversed"]
 
 
 @pytest.mark.parametrize("size", [0.02, 5.0])

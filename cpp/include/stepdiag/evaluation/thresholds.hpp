@@ -30,6 +30,8 @@ struct Thresholds {
     double gross_scatter = 25.0;   // of the square sum a reading: values far from any machine
     double mistake = 60.0;         // least gain of a mistake in the whole run
     double chance = 9.0;           // difference that does not make one mistake better than another
+    // From so many faults, or faults on so many lines, one mistake that explains as much is the likelier.
+    double faults_of_mistake = 3.0, lines_of_mistake = 2.0;
     // Power: square root of the noncentrality with which a fault is found with 99 %, sqrt(28) + 2.3.
     double found_with_99_percent = 7.6;
 
