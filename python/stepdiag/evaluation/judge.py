@@ -3,7 +3,15 @@
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
+from stepdiag._core import (
+    Adjustment,
+    Calibration,
+    FaultClass,
+    InvalidArgument,
+    Measurement,
+    Outlier,
+    VarianceComponent,
+)
 from stepdiag.calibration.finding_text import mistake_reason
 from stepdiag.mistakes.search import FoundMistake, MistakeSearch
 from stepdiag.mistakes.text import change_rows, mistake_text
@@ -39,6 +47,27 @@ class Judgement:
     def calibration(self) -> Calibration:
         """What was found, with the verdict in `fit` and `fit_reasons`."""
         return self.result.calibration
+
+    @property
+    def left_out(self) -> list[Outlier]:
+        """Readings that were left out; none of a linear method alone."""
+        return self.adjustment.outliers if self.adjustment else []
+
+    @property
+    def freed(self) -> list[FaultClass]:
+        """Faults of which the sizes became unknowns."""
+        faults = self.adjustment.faults if self.adjustment else []
+        return [found for found in faults if found.treatment == "estimated"]
+
+    @property
+    def variance_components(self) -> list[VarianceComponent]:
+        """How much each channel scatters beside what is stated, and whether it was weighed with that."""
+        return self.adjustment.variance_components if self.adjustment else []
+
+    @property
+    def conditions(self) -> list[str]:
+        """Under which conditions it was evaluated: temperatures, the air, the instrument; a sentence each."""
+        return self.calibration.conditions
 
     @property
     def fit(self) -> str:

@@ -28,6 +28,14 @@ def wrong(name: str, rows: slice, size: float) -> Callable[[sd.Measurement], sd.
     return with_fault
 
 
+def scattered(name: str, u: float) -> Callable[[sd.Measurement], sd.Measurement]:
+    def with_noise(run: sd.Measurement) -> sd.Measurement:
+        noise = np.random.default_rng(7).normal(0.0, u, len(run))
+        return changed(run, {name: run.channels[name] + noise})
+
+    return with_noise
+
+
 RUNS = {
     "sound": lambda run: run,
     "tilts with the wrong sign": times(-1.0, "alpha", "beta"),
@@ -36,6 +44,7 @@ RUNS = {
     "three wrong tilts": wrong("beta", slice(4, 40, 12), 2e-4),
     "a slip of distances": wrong("distance", slice(6, 16), 3e-3),
     "a wrong distance": wrong("distance", slice(5, 6), 1e-2),
+    "distances that scatter more": scattered("distance", 2e-3),
 }
 
 
@@ -99,3 +108,16 @@ def test_a_linear_method_has_the_worse_of_both_verdicts(folder: Path, method: st
 def test_thresholds_are_those_of_the_core() -> None:
     assert sd._core.thresholds.fault == 28.0
     assert sd._core.thresholds.largest_variance_factor == sd._core.thresholds.largest_noise_factor**2
+
+
+def test_a_judgement_has_what_was_done_about_the_readings(folder: Path) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    run = sd.simulate_scenario(scenario)
+    tilt = sd.judge(scenario, wrong("alpha", slice(7, 8), 1e-4)(run))
+    assert [(reading.row, reading.channel) for reading in tilt.left_out] == [(7, "alpha")]
+    assert tilt.freed == []
+    assert tilt.conditions == tilt.calibration.conditions != []
+    noise = sd.judge(scenario, scattered("distance", 2e-3)(run))
+    assert (noise.fit, noise.mistakes, noise.left_out, noise.freed) == ("rejected", (), [], [])
+    assert [c.channel for c in noise.variance_components if c.used] == ["distance"]
+    assert noise.reasons[0].startswith("noise: distance scatters ")
