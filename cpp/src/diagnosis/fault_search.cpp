@@ -45,9 +45,9 @@ std::optional<FaultState> Search::run() const {
     const bool corrects = options.outlier_probability > 0.0;
     const SolutionPointer& all = context_.all;  // 1
     std::optional<FaultState> state;
-    if (options.search_faults && corrects) state = without_gross(all);  // 2
+    if (corrects) state = without_gross(all);  // 2
     if (!state && all) state = FaultState{{}, all};
-    if (!state || !options.search_faults) return state;
+    if (!state) return state;
     if (corrects) state = correct(*state);  // 3 to 9
     if (corrects && !state->gave_up && state->found.empty()) return state;
     return with_left(state->gave_up && all ? FaultState{{}, all} : *state);  // 10

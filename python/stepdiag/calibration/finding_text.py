@@ -289,10 +289,9 @@ def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
     reasons = reason_texts(verdict.reasons)
     is_noise = bool(verdict.reasons) and _is_noise_of_channel(verdict.reasons[0])
     said = reasons.pop(0) if verdict.fit == "doubtful" or is_noise else MEANING[verdict.fit]
-    if verdict.fit == "accepted" and adjustment.faults:
-        said = f"{_corrected(adjustment)}; {said}"
+    corrected = f"; {_corrected(adjustment)}" if verdict.fit == "accepted" and adjustment.faults else ""
     yield (
-        f"fit: {_shown(verdict.fit)}: {said} (variance factor {adjustment.variance_factor:.3g} with "
+        f"fit: {_shown(verdict.fit)}{corrected}: {said} (variance factor {adjustment.variance_factor:.3g} with "
         f"{adjustment.degrees_of_freedom} degrees of freedom, {_probability(adjustment.chi_square_probability)})"
     )
     yield from (f"{verdict.fit} because {reason}" for reason in reasons)

@@ -118,7 +118,7 @@ def judge(
     adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
     if search and not mistakes and _is_noise(adjusted):
         # A mistake is what explains all of the scatter; a part of it is noise.
-        mistakes = [found for found in search.after(None) if found.fit == "accepted"]
+        mistakes = [found for found in search.after(None, disturbed=False) if found.fit == "accepted"]
     elif search and not mistakes and _is_odd(adjusted):
         mistakes = search.after(adjusted)
     is_corrected = adjusted is not None and adjusted.verdict.fit == "accepted"

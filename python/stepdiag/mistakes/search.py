@@ -153,8 +153,11 @@ class MistakeSearch:
             )
         return found if found and found[0].fit == "accepted" else []
 
-    def after(self, adjustment: _core.Adjustment | None, *, refused: bool = False) -> list[FoundMistake]:
-        """As find_mistakes."""
+    def after(
+        self, adjustment: _core.Adjustment | None, *, refused: bool = False, disturbed: bool = True
+    ) -> list[FoundMistake]:
+        """As find_mistakes. Without `disturbed` no line is named that merely disagrees with the others: without one
+        of few lines nothing controls the noise of the others."""
         self._adjustment = adjustment
         if refused:
             self._is_impossible, self._as_read = True, _NONE
@@ -166,7 +169,7 @@ class MistakeSearch:
                 self._named(self._single)
                 or self._named(self._of_families())
                 or self._named(self._pairs())
-                or self._named(self._disturbed())
+                or (self._named(self._disturbed()) if disturbed else [])
             )
 
     @cached_property

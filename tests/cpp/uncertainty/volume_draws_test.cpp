@@ -83,7 +83,7 @@ TEST(VolumeDraws, FiguresAreThoseOfEveryPoint) {
                 const Machine machine = machine_of(calibration.chain, grid, table);
                 Vector3d low = Vector3d::Constant(1e9), high = -low;
                 double largest = 0.0, mean2 = 0.0;
-                Vector3d worst, there;
+                Vector3d worst, there = Vector3d::Zero();  // for a compiler that sees no loop
                 std::array<std::vector<double>, 3> weights;
                 for (std::size_t a = 0; a < 3; ++a) weights[a] = trapezoidal_weights(positions[a]);
                 for (std::size_t i = 0; i < positions[0].size(); ++i)
