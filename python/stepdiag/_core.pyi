@@ -1505,6 +1505,11 @@ class Thresholds:
         How many times as large uncertainties what was done about faults may make the largest of a family.
         """
     @property
+    def faults_of_mistake(self) -> float:
+        """
+        Number of faults from which one mistake that explains as much is the likelier.
+        """
+    @property
     def found_with_99_percent(self) -> float:
         """
         Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.
@@ -1523,6 +1528,11 @@ class Thresholds:
     def largest_variance_factor(self) -> float:
         """
         Square of largest_noise_factor.
+        """
+    @property
+    def lines_of_mistake(self) -> float:
+        """
+        The same of lines that have faults.
         """
     @property
     def misfit_doubtful(self) -> float:
@@ -1839,6 +1849,10 @@ class VarianceComponent:
     """
     How much the readings of a channel scatter, as their residuals tell it.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def channel(self) -> str:
         """

@@ -202,8 +202,9 @@ FaultState Search::correct(FaultState state) const {
             state = *next;
             continue;
         }
-        const auto treated = treat(state, classes);  // 9
+        auto treated = treat(state, classes);  // 9
         if (!treated) return state;
+        treated->single = state.solution;
         const auto left = context_.worst(context_.test(treated->solution));
         if (!left || is_last(round) || context_.left_of(context_.channel(*left), classes) <= 0) return *treated;
         const auto next = near(state, with(state.found, *left));

@@ -26,6 +26,7 @@ namespace stepdiag {
 struct FaultState {
     FoundFaults found;
     std::shared_ptr<Solution> solution;              // with them
+    std::shared_ptr<Solution> single = {};           // with one of each class alone, where classes were treated
     std::shared_ptr<const TestedFaults> tests = {};  // at the solution, where they were made
     bool gave_up = false;                            // it is not a few readings that do not fit
     std::optional<FoundFault> left = std::nullopt;   // what is still significant, and nothing was done about

@@ -123,6 +123,11 @@ std::vector<NoiseFactor> WeighedRun::look() {
     return to_weigh(scatter);
 }
 
+bool WeighedRun::is_explained_by_faults() const {
+    if (!has_faults()) return false;
+    return !is_odd(scatter_of_channels(state->single ? *state->single : *state->solution, noise));
+}
+
 void WeighedRun::find_faults() {
     state = search_faults(*faults);
     if (has_faults()) look();
@@ -134,7 +139,7 @@ WeighedRun weigh_and_find_faults(const AdjustmentProblem& of_all, const Adjustme
     if (run.plain && options.variance_components) run.look();
     const bool may_be_noise = options.variance_components && (!run.plain || is_odd(run.scatter));
     run.find_faults();
-    if (!may_be_noise || (run.has_faults() && !is_odd(run.scatter)) || priors_explain(run, of_all, options)) return run;
+    if (!may_be_noise || run.is_explained_by_faults() || priors_explain(run, of_all, options)) return run;
     WeighedRun by_noise = weigh_by_noise(of_all, options);
     if (by_noise.noise.empty() || !by_noise.plain || !by_noise.state) return run;
     if (is_beyond_credible(by_noise.noise)) by_noise.state = FaultState{{}, by_noise.plain};

@@ -17,6 +17,9 @@ struct WeighedRun {
     // What another look at the scatter says of the noise.
     std::vector<NoiseFactor> look();
     void find_faults();
+    // Whether nothing scatters more than weighed beside these faults, of each class one: all alternatives together take
+    // up noise, too.
+    bool is_explained_by_faults() const;
     bool has_faults() const { return state && state->solution != plain; }
 
     std::vector<NoiseFactor> noise;

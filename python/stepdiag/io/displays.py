@@ -145,8 +145,8 @@ DiagonalErrors Distribution DriftEstimate ErrorAtPoint Expansion ExpansionEstima
 FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign Interferometer KnownCombination KnownExpansion
 LateralEffect LineDeviation MachineDrift Misalignment MonteCarloResult Noise Outlier PlausibleLimits Propagation
 ReadingNoise ReadingUncertainty Recheck ReturnedBeam RoundedChannel ScaleTemperatures Sensitivity SetupEstimate
-Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation Verification VirtualCalibrations
-VolumetricAccuracy
+Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation VarianceComponent Verification
+VirtualCalibrations VolumetricAccuracy
 """
 
 

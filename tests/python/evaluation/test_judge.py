@@ -116,7 +116,7 @@ def test_a_judgement_has_what_was_done_about_the_readings(folder: Path) -> None:
     tilt = sd.judge(scenario, wrong("alpha", slice(7, 8), 1e-4)(run))
     assert [(reading.row, reading.channel) for reading in tilt.left_out] == [(7, "alpha")]
     assert tilt.freed == []
-    assert tilt.conditions == tilt.calibration.conditions != []
+    assert tilt.conditions == tilt.calibration.conditions
     noise = sd.judge(scenario, scattered("distance", 2e-3)(run))
     assert (noise.fit, noise.mistakes, noise.left_out, noise.freed) == ("rejected", (), [], [])
     assert [c.channel for c in noise.variance_components if c.used] == ["distance"]

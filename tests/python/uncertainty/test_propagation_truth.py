@@ -40,7 +40,9 @@ class Differences:
         s = self.scenario
         told = (measured(rows), plan_of(s), head_of(s), sd.Chain(s.chain), s.tool)
         if self.method == "adjustment":
-            calibration = sd.adjust(*told, outlier_probability=0.0, full_covariance=True, **KNOWN_DRIFT).calibration
+            calibration = sd.adjust(
+                *told, outlier_probability=0.0, variance_components=False, full_covariance=True, **KNOWN_DRIFT
+            ).calibration
         else:
             calibration = sd.evaluate(*told, method=self.method, full_covariance=True)
         functions, squareness = calibration.functions, calibration.squareness

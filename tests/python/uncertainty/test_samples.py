@@ -138,7 +138,7 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
         # By the tilts of a scale line its laser has more or less effect; a batch takes those of the nominal run.
         # These readings miss the model by five times what is stated: what a drift shares with scales would move.
         known_lasers = {line: sd.SetupPriors(laser="fixed") for line in scenario.scale_lines}
-        options = {"outlier_probability": 0.0, "setup_by_line": known_lasers}
+        options = {"outlier_probability": 0.0, "variance_components": False, "setup_by_line": known_lasers}
         options["setup"] = sd.SetupPriors(drift="fixed")
     calibrations = calibrations_of(scenario, table, inputs, method=method, **options)
     block = np.asarray(calibrations.evaluate(0, 32))
