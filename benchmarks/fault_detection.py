@@ -210,7 +210,10 @@ def controlled(setting: Setting, seed: int, fault: Fault) -> float:
     """
     run, _ = setting.run(seed, noisy=False)
     few = 5.0  # small: of first order
-    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, few * noise_of(fault.channel)))]
+    left = [
+        setting.adjust(r, outlier_probability=0.0, variance_components=False)
+        for r in (run, fault.into(run, few * noise_of(fault.channel)))
+    ]
     sound, faulty = (math.nan if a is None else a.weighted_square_sum for a in left)
     added = (faulty - sound) / few**2
     return added if 0.0 < added <= len(fault.rows) else 0.0
