@@ -33,7 +33,7 @@ class Judgement:
 
     result: the adjustment, or what a linear method found beside it. Its verdict counts the mistakes.
     mistakes: of which one would explain the run; where the fit is accepted nevertheless, it is the faults of readings
-        that were found and corrected, which no reading distinguishes from that."""
+    that were found and corrected, which no reading distinguishes from that."""
 
     result: Adjustment | JudgedEvaluation
     mistakes: tuple[FoundMistake, ...] = ()
