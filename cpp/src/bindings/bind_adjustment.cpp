@@ -376,13 +376,14 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "finding", [](const FitReason& r) { return name(r.finding); },
             "\"no_redundancy\"; \"no_noise\": rms of the residuals in units of their rounding; \"noise_factor\", "
-            "\"misfit\", \"no_misfit\": root of the variance factor, not "
+            "\"misfit\", \"no_misfit\": root of the variance factor, or the noise factor of `channel` on `line`, not "
             "credible, or larger or smaller than chance explains; \"uneven_misfit\": noise factor of one group of "
             "readings, and as the limit that of the others; \"trend\": what residuals of one channel run by, from the "
             "first reading to the last (mm or rad); "
             "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
-            "a fault that was not corrected takes off chi-square; \"alternatives\": by how much alternative faults "
-            "differ in `parameter`; \"scaled\": what the uncertainties were multiplied by; \"mistake\": `parameter` "
+            "a fault that was not corrected takes off chi-square; \"fault_cost\": what the uncertainty of `parameter` "
+            "is multiplied by because of corrected faults; \"undetermined\": they leave `parameter` undetermined; "
+            "\"alternatives\": by how much alternative faults differ in `parameter`; \"scaled\": what the uncertainties were multiplied by; \"mistake\": `parameter` "
             "says which one would explain the readings; \"implausible_input\": `parameter` says what no workshop "
             "has.")
         .def_readonly("value", &FitReason::value, "Of a trend mm or rad.")

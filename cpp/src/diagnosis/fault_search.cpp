@@ -208,7 +208,7 @@ FaultState Search::correct(FaultState state) const {
         const auto left = context_.worst(context_.test(treated->solution));
         if (!left || is_last(round) || context_.left_of(context_.channel(*left), classes) <= 0) return *treated;
         const auto next = near(state, with(state.found, *left));
-        if (!next) return {classes, treated->solution};  // said as they were to be treated, not as open
+        if (!next) return *treated;
         state = *next;
     }
     return state;

@@ -8,10 +8,10 @@
 // redundancies, which is known.
 //
 // Gross readings and slips spoil square sums. So the differences of successive residuals of a channel in one set-up,
-// which a slip changes once, are compared with those of the draws, by the mean of the smaller half of their squares: up
-// to half of them may be anything. That is the robust factor. Where the square sum says no more than this, the scatter
-// is that of noise, and the component is its size, which is known more closely. Where it says more, something else is
-// in the residuals.
+// which a slip changes once, are compared with those of the draws. The mean of the smaller half of their squares gives
+// the robust factor: up to half of them may be anything. Gross readings make the smaller half small beside the residuals,
+// and what is smooth makes all differences small beside them. Where neither ratio is clearly smaller than that of the
+// draws, the scatter is that of noise, and its component comes from the square sum, which knows it more closely.
 #pragma once
 
 #include <vector>
@@ -27,7 +27,7 @@ struct ScatterOfChannel {
     VarianceComponent component;  // beside what was stated
     double probability = 1.0;     // that chance makes the factor as large where the noise is as stated
     bool is_significant = false;  // more than stated, and known closely enough to say so
-    bool is_noise = true;         // the square sum says no more than the smaller half of the differences
+    bool is_noise = true;         // the differences are as large beside the residuals as those of noise
 };
 
 // Of each channel that is controlled, and of its lines that scatter otherwise than the others. `weighed`: the factors
