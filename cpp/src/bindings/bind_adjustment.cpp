@@ -383,7 +383,8 @@ void bind_result(py::module_& m) {
             "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
             "a fault that was not corrected takes off chi-square; \"fault_cost\": what the uncertainty of `parameter` "
             "is multiplied by because of corrected faults; \"undetermined\": they leave `parameter` undetermined; "
-            "\"alternatives\": by how much alternative faults differ in `parameter`; \"scaled\": what the uncertainties were multiplied by; \"mistake\": `parameter` "
+            "\"alternatives\": by how much alternative faults differ in `parameter`; \"scaled\": what the "
+            "uncertainties were multiplied by; \"mistake\": `parameter` "
             "says which one would explain the readings; \"implausible_input\": `parameter` says what no workshop "
             "has.")
         .def_readonly("value", &FitReason::value, "Of a trend mm or rad.")

@@ -9,9 +9,10 @@
 //
 // Gross readings and slips spoil square sums. So the differences of successive residuals of a channel in one set-up,
 // which a slip changes once, are compared with those of the draws. The mean of the smaller half of their squares gives
-// the robust factor: up to half of them may be anything. Gross readings make the smaller half small beside the residuals,
-// and what is smooth makes all differences small beside them. Where neither ratio is clearly smaller than that of the
-// draws, the scatter is that of noise, and its component comes from the square sum, which knows it more closely.
+// the robust factor: up to half of them may be anything. Gross readings make the smaller half small beside the
+// residuals, and what is smooth makes all differences small beside them. Where neither ratio is clearly smaller than
+// that of the draws, the scatter is that of noise, and its component comes from the square sum, which knows it more
+// closely.
 #pragma once
 
 #include <vector>

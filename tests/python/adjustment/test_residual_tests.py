@@ -53,8 +53,8 @@ def test_larger_noise_is_measured_by_channel_and_said() -> None:
         assert component.used
         assert (reason.value, reason.standard_uncertainty) == (component.factor, component.standard_uncertainty)
         assert abs(component.factor - 1.4) < 3 * component.standard_uncertainty
-    # The run is adjusted with that noise: to 1 % of a factor, where the iteration ends, so 2 % of its square, and to what
-    # 16 draws know of the redundancies.
+    # The run is adjusted with that noise: to 1 % of a factor, where the iteration ends, so 2 % of its square, and to
+    # what 16 draws know of the redundancies.
     assert found.variance_factor == pytest.approx(1.0, abs=0.05)
     first, *_, note = verdict_rows(found)
     assert first.startswith("fit: doubtful: noise: alpha scatters 1.4")

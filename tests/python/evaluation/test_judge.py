@@ -46,10 +46,6 @@ def exchanged(run: sd.Measurement) -> np.ndarray:
     return rows
 
 
-def backward(run: sd.Measurement) -> np.ndarray:
-    return np.concatenate([rows_of(run, line)[::-1] for line in dict.fromkeys(run.line)])
-
-
 RUNS = {
     "sound": lambda run: run,
     "tilts with the wrong sign": times(-1.0, "alpha", "beta"),
@@ -60,7 +56,6 @@ RUNS = {
     "a wrong distance": wrong("distance", slice(5, 6), 1e-2),
     "distances that scatter more": scattered("distance", 2e-3),
     "two lines exchanged": with_readings_of(exchanged),
-    "every line backward": with_readings_of(backward),
     "a reading lost": with_readings_of(lambda run: np.where(np.arange(len(run)) == 9, -1, np.arange(len(run)))),
 }
 SHIPPED = Path(sd.__file__).parent / "selftest" / "known" / "runs"
