@@ -108,12 +108,12 @@ def outcome(case: Case, number: int) -> Outcome:
     repeats = int(rng.integers(1, 11))
     misalignment = {line: set_up(case, rng, line in SCALE_LINES) for line in [*lines, *SCALE_LINES]}
     run = sd.simulate(sd.Machine(chain, errors, tool), plan, head, misalignment=misalignment, repeats=repeats)
-    u = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=1e-3)
+    u = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=1e-3)
     noise = {"d": u.distance, "a": u.tilt, "b": u.tilt, "s": u.spot}
     channels = {name: v + noise[name[0]] * rng.normal(size=len(run)) for name, v in run.channels.items()}
     noisy = sd.Measurement(run.line, run.point, run.position, channels, run=run.run)
     try:
-        found = sd.adjust(noisy, plan, head, chain, tool, uncertainty=u, outlier_probability=0.0)
+        found = sd.methods.adjust(noisy, plan, head, chain, tool, uncertainty=u, outlier_probability=0.0)
     except sd.InvalidArgument:
         return Outcome(refused=True)
     freedom = found.degrees_of_freedom

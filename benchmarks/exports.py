@@ -29,11 +29,11 @@ from simple_exports import MOTORS
 from usual import ALL_CHAINS, CHAIN, VOLUME
 
 import stepdiag as sd
-from stepdiag.export.common import ExportOptions
-from stepdiag.export.fewest_nodes import largest_deviation
-from stepdiag.export.left_in_volume import left_in_volume
-from stepdiag.export.linuxcnc_comp import JointTable
-from stepdiag.export.write import write_export
+from stepdiag.exporting.common import ExportOptions
+from stepdiag.exporting.fewest_nodes import largest_deviation
+from stepdiag.exporting.left_in_volume import left_in_volume
+from stepdiag.exporting.linuxcnc_comp import JointTable
+from stepdiag.exporting.write import write_export
 
 TOOL = (0.0, 0.0, 120.0)
 STATED = 1e-9  # mm: rounding, of files with nine digits after the point

@@ -118,9 +118,9 @@ class Setting:
 
     def adjust(self, run: sd.Measurement, **more: Any) -> sd.Adjustment | None:
         """None for an error."""
-        given: dict[str, Any] = {"uncertainty": sd.ReadingUncertainty(**NOISE), **self.options, **more}
+        given: dict[str, Any] = {"uncertainty": sd.methods.ReadingUncertainty(**NOISE), **self.options, **more}
         try:
-            return sd.adjust(run, self.plan, HEADS[self.head], CHAIN, **given)
+            return sd.methods.adjust(run, self.plan, HEADS[self.head], CHAIN, **given)
         except sd.InvalidArgument:
             return None
 
@@ -324,7 +324,7 @@ def covered(name: str, seed: int) -> tuple[str, Counter[str], Counter[str]]:
 def coverage(tasks: Tasks, runs: int) -> bool:
     rows, each = [], max(60, runs // 10)
     for name, setting in COVERED.items():
-        if not all(hasattr(sd.AdjustmentOptions, option) for option in setting.options):
+        if not all(hasattr(sd.methods.AdjustmentOptions, option) for option in setting.options):
             continue
         outcomes = list(tasks(functools.partial(covered, name), each))
         fits = Counter(fit for fit, _, _ in outcomes)
@@ -384,7 +384,7 @@ def reported(tasks: Tasks, runs: int) -> bool:
     for method, misalignment in (("conventional", small), ("enhanced", large)):
         setting, machine, run = simulated(misalignment=misalignment)
         told = (run, setting.plan, HEADS["ideal"], CHAIN)
-        calibration = sd.evaluate(*told, method=method, uncertainty=sd.ReadingUncertainty(**NOISE))
+        calibration = sd.methods.evaluate(*told, method=method, uncertainty=sd.methods.ReadingUncertainty(**NOISE))
         rows.append([f"8: {method}", *worst(calibration, machine, "")])
     columns = ["fault", "fit", "worst value", "error, µm or µrad", "u", "error/u", "members of the classes found"]
     return table("Mistakes that users made", columns, rows)

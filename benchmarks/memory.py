@@ -26,8 +26,8 @@ def measure(samples: int, threads: int, covariance: bool) -> None:
     model = virtual("enhanced", "psd", 50)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     start = time.monotonic()
-    options = sd.StatisticsOptions(covariance=covariance)
-    result = sd.run_monte_carlo(model, samples=samples, threads=threads, options=options)
+    options = sd.montecarlo.StatisticsOptions(covariance=covariance)
+    result = sd.montecarlo.run_monte_carlo(model, samples=samples, threads=threads, options=options)
     seconds = time.monotonic() - start
     assert result.samples == samples
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

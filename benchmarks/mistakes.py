@@ -156,11 +156,11 @@ def one(head: str, steps: int, number: int, seed: int) -> tuple[float, bool, int
 
 def largest_effect(scenario: sd.Scenario, wrong: sd.Measurement, sound: sd.Measurement) -> tuple[float, float]:
     """Largest difference of two calibrations, µm and µrad; 0 where the wrong one is rejected."""
-    adjustment = sd.adjust_scenario(scenario, wrong)
+    adjustment = sd.methods.adjust_scenario(scenario, wrong)
     if adjustment.verdict.fit == "rejected":
         return 0.0, 0.0
     largest = {"um": 0.0, "urad": 0.0}
-    other = sd.adjust_scenario(scenario, sound).calibration
+    other = sd.methods.adjust_scenario(scenario, sound).calibration
     for name, (_, values, _) in adjustment.calibration.functions.items():
         of = "urad" if sd.kind_of(name) == "angle" else "um"
         largest[of] = max(largest[of], float(np.max(np.abs(values - other.functions[name][1]))))

@@ -64,7 +64,7 @@ def scenario(head: str, steps: int, seed: int, stated: dict[str, float] | None =
 
 def cases(head: str, steps: int, seed: int) -> Iterator[Case]:
     keys = HEADS[head][1]
-    run = sd.simulate_scenario(scenario(head, steps, seed))
+    run = sd.simulate(scenario(head, steps, seed))
     some = [(key,) for key in keys] + ([keys] if len(keys) > 1 else [])
     for wrong in some:
         for factor in (*UNDERSTATED, *OVERSTATED):
@@ -87,7 +87,7 @@ def cases(head: str, steps: int, seed: int) -> Iterator[Case]:
             )
 
 
-def failures(case: Case, judged: sd.Judgement) -> list[str]:
+def failures(case: Case, judged: sd.results.Judgement) -> list[str]:
     found = judged.adjustment
     assert found is not None
     wrong = []

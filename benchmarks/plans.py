@@ -124,10 +124,10 @@ class Cell:
         """By family, um or urad."""
         scenario = self.scenario()
         if self.inputs == "noise alone":
-            run = sd.simulate_scenario(scenario)
-            found = largest_uncertainties(sd.adjust_scenario(scenario, run).calibration)
+            run = sd.simulate(scenario)
+            found = largest_uncertainties(sd.methods.adjust_scenario(scenario, run).calibration)
             return [found[kind][0] * MICRO[kind] for kind in KINDS]
-        result = sd.evaluate_uncertainty(scenario, sd.UncertaintyRequest())
+        result = sd.montecarlo.evaluate_uncertainty(scenario, sd.montecarlo.UncertaintyRequest())
         u = result.uncertainties()
         by_family = {family: float(u[members].max()) for family, members in result.families()}
         return [by_family[kind] * MICRO[kind] for kind in KINDS]

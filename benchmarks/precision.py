@@ -93,7 +93,7 @@ def cell(steps: int, seed: int, of: tuple[str, bool, float, float]) -> tuple[str
     layout, balanced, size, relative = of
     try:
         described = scenario(layout, size, relative, balanced=balanced, noisy=True, steps=steps, seed=seed)
-        found = sd.adjust_scenario(described, sd.simulate_scenario(described))
+        found = sd.methods.adjust_scenario(described, sd.simulate(described))
     except (sd.InvalidArgument, MemoryError) as error:
         return "E", f"{layout} {size:g} mm: {error!r}" if isinstance(error, MemoryError) else str(error).splitlines()[
             0
@@ -123,7 +123,7 @@ def floor(steps: int, of: tuple[str, float]) -> str:
     layout, size = of
     described = scenario(layout, size, 1e-9, balanced=True, noisy=False, steps=steps, seed=1)
     try:
-        found = sd.adjust_scenario(described, sd.simulate_scenario(described))
+        found = sd.methods.adjust_scenario(described, sd.simulate(described))
     except sd.InvalidArgument:
         return "E"
     residuals = [values for name, values in found.residuals.items() if name.startswith("d")]

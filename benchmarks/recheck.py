@@ -49,9 +49,9 @@ from rechecked import (
 
 import stepdiag as sd
 from stepdiag.parameters import FUNCTIONS, KINDS, NATIVE_UNIT, SQUARENESSES, kind_of
+from stepdiag.presentation.verification import agrees
 from stepdiag.rechecking.recheck import Judged
 from stepdiag.rechecking.verification import ALPHA
-from stepdiag.report.verification import agrees
 from stepdiag.units import report_value
 
 ALPHAS = (0.05, 0.01, 0.001)
@@ -65,8 +65,8 @@ def unchanged(seed: int, steps: int) -> tuple[float, float, list[float], list[fl
     plan = short_plan(drawn, seed, steps)
     run = read_again(drawn, drawn.machine, plan, rng)
     given = (baseline, run, plan, drawn.head, sd.Chain(drawn.chain), drawn.machine.tool)
-    found = sd.recheck(*given, options=options(drawn))
-    verified = sd.verify(*given, options=options(drawn))
+    found = sd.methods.recheck(*given, options=options(drawn))
+    verified = sd.methods.verify(*given, options=options(drawn))
     of_lines = [line.normalised for line in verified.lines]
     of_readings = [float(value) for values in verified.normalised.values() for value in values if value != 0.0]
     return found.probability, verified.probability, of_lines, of_readings, found.fit_probability
@@ -112,7 +112,9 @@ def changed(
     change = random_change(rng, size)
     machine = changed_machine(drawn, change)
     run = read_again(drawn, machine, plan, rng)
-    found = sd.recheck(baseline, run, plan, drawn.head, sd.Chain(drawn.chain), machine.tool, options=options(drawn))
+    found = sd.methods.recheck(
+        baseline, run, plan, drawn.head, sd.Chain(drawn.chain), machine.tool, options=options(drawn)
+    )
     normalised = [(term.value - change[term.parameter]) / term.standard_uncertainty for term in found.terms]
     kinds = np.array([kind_of(name) for name, _ in baseline.covariance_labels])
     squares = []
@@ -128,8 +130,8 @@ def eventful(seed: int, steps: int) -> tuple[str, str, str, str, bool]:
     event, layout = EVENTS[seed % len(EVENTS)], LAYOUTS[seed // len(EVENTS) % len(LAYOUTS)]
     one = after(event, layout, seed // (len(EVENTS) * len(LAYOUTS)), 2 * steps)
     try:
-        judged = Judged(sd.recheck(*one.given, options=one.options), one.baseline, ALPHA)
-        verified = sd.verify(*one.given, options=one.options)
+        judged = Judged(sd.methods.recheck(*one.given, options=one.options), one.baseline, ALPHA)
+        verified = sd.methods.verify(*one.given, options=one.options)
     except sd.InvalidArgument as error:
         return event, layout, f"error: {error}", "", False
     named = [

@@ -32,7 +32,7 @@ HEADS = {
 METHODS = ["adjustment", "enhanced", "conventional"]
 LARGEST_POWER = 1.5  # a tape that leaves the cache takes longer
 LARGEST_MISS = 6.0  # in standard uncertainties, of some hundred values
-UNCERTAINTY = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=1e-3)
+UNCERTAINTY = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=1e-3)
 
 
 def miss(calibration: sd.Calibration, truth: sd.ErrorMap) -> float:
@@ -54,9 +54,9 @@ def measure(head: str, method: str, runs: int, steps: int) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     start = time.process_time()
     if method == "adjustment":
-        calibration = sd.adjust(run, plan, HEADS[head], CHAIN, uncertainty=UNCERTAINTY).calibration
+        calibration = sd.methods.adjust(run, plan, HEADS[head], CHAIN, uncertainty=UNCERTAINTY).calibration
     else:
-        calibration = sd.evaluate(run, plan, HEADS[head], CHAIN, method=method, uncertainty=UNCERTAINTY)
+        calibration = sd.methods.evaluate(run, plan, HEADS[head], CHAIN, method=method, uncertainty=UNCERTAINTY)
     seconds = time.process_time() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024 - before
     print(seconds, peak, 0.0 if method == "conventional" else miss(calibration, truth))

@@ -130,10 +130,10 @@ def one(number: int) -> tuple[str, str, list[str], float, str]:
     """Plan, fit ("refused": no result), codes of the reasons, processor seconds of the evaluation, what was refused."""
     plan = list(PLANS)[number % len(PLANS)]
     described = scenario(plan, number)
-    run = sd.simulate_scenario(described)
+    run = sd.simulate(described)
     start = time.process_time()
     try:
-        verdict = sd.adjust_scenario(described, run).verdict
+        verdict = sd.methods.adjust_scenario(described, run).verdict
     except sd.InvalidArgument as error:
         return plan, "refused", [], time.process_time() - start, f"run {number}: {error}"
     codes = sorted({reason.finding for reason in verdict.reasons})

@@ -29,7 +29,7 @@ from usual import ALL_CHAINS, DIAGONALS, SCALE_LINES, VOLUME
 import stepdiag as sd
 
 STATED, U_COEFFICIENT, U_SENSOR = 11.5e-6, 1e-6, 0.1
-NOISE = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6)
+NOISE = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6)
 LOW, HIGH = 0.94, 0.96
 ENDS = ("EXX", "EYY", "EZZ")
 SENSORS = ("temperature_x", "temperature_y", "temperature_z")
@@ -62,15 +62,15 @@ def of_machine(steps: int, seed: int) -> tuple[bool, list[bool], float]:
     channels = {name: run.channels[name] + d for name, d in zip(SENSORS, deviations, strict=True)}
     if in_common:
         channels = {"temperature": channels[SENSORS[0]]}
-    known = sd.KnownExpansion(
+    known = sd.methods.KnownExpansion(
         sd.Expansion(np.full(3, STATED), fixed_point=fixed_point),
         np.full(3, U_COEFFICIENT),
         one_coefficient=in_common,
         sensor_uncertainty=U_SENSOR,
     )
     told = (with_channels(run, channels), plan, sd.Head(), chain)
-    found = sd.adjust(*told, uncertainty=NOISE, expansion=known, outlier_probability=0.0).calibration
-    without = sd.adjust(*told, uncertainty=NOISE, outlier_probability=0.0).calibration
+    found = sd.methods.adjust(*told, uncertainty=NOISE, expansion=known, outlier_probability=0.0).calibration
+    without = sd.methods.adjust(*told, uncertainty=NOISE, outlier_probability=0.0).calibration
     covered, wrong = [], 0.0
     for name in ENDS:
         position, value, uncertainty = found.functions[name]

@@ -719,7 +719,7 @@ def simulated(scenario: dict[str, Any]) -> list[Row]:
     described = sd.parse_scenario(toml(scenario))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.csv"
-        sd.simulate_scenario(described).write(path)
+        sd.simulate(described).write(path)
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
     air = scenario["environment"]

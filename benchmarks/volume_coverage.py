@@ -47,11 +47,11 @@ def of_machine(level: float, seed: int, steps: int, samples: int) -> list[float]
     standard uncertainty relative to itself."""
     drawn, rng = coverage_cases.draw(CASE, seed, steps)
     u = drawn.uncertainty
-    noisy = sd.ReadingUncertainty(distance=level * u.distance, tilt=level * u.tilt, spot=level * u.spot)
+    noisy = sd.methods.ReadingUncertainty(distance=level * u.distance, tilt=level * u.tilt, spot=level * u.spot)
     drawn = replace(drawn, uncertainty=noisy)
     calibration = coverage_cases.evaluated(CASE, drawn, coverage_cases.measured(drawn, rng))
-    found = sd.volume_errors(calibration, between_nodes=0.0, ranking=False, samples=samples, seed=seed)
-    truth = sd.volume_errors(drawn.machine, box=found.box, grid=None, ranking=False)
+    found = sd.volume(calibration, between_nodes=0.0, ranking=False, samples=samples, seed=seed)
+    truth = sd.volume(drawn.machine, box=found.box, grid=None, ranking=False)
     pairs = [(found.largest_interval, truth.largest), (found.rms_interval, truth.rms)]
     pairs += [(found.ranges[axis].interval, truth.ranges[axis].value) for axis in "XYZ"]
     covered = [float(interval[0] <= true <= interval[1]) for interval, true in pairs if interval is not None]

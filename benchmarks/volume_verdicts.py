@@ -104,7 +104,7 @@ class Truth:
         """The true largest error at the nodes, its components, and its standard uncertainty along itself, and along X,
         Y and Z together."""
         own = self.calibration(self.values, self.covariance)
-        found = sd.volume_errors(own, box=self.box, between_nodes=0.0, ranking=False, samples=1000)
+        found = sd.volume(own, box=self.box, between_nodes=0.0, ranking=False, samples=1000)
         assert found.largest_chosen is not None
         chosen = found.largest_chosen
         return found.largest, found.largest_components, float(chosen.u[0]), math.sqrt(float(chosen.variance[0]))
@@ -123,7 +123,7 @@ class Truth:
                 curve[:-1] += (heights * 4.0 * share * (1.0 - share)).ravel()
             functions[name] = (fine, curve)
         machine = sd.Machine(self.chain, sd.ErrorMap(functions, self.squareness), self.tool)
-        return float(sd.volume_errors(machine, box=self.box, ranking=False).largest)
+        return float(sd.volume(machine, box=self.box, ranking=False).largest)
 
 
 def drawn_machine(seed: int, level: float) -> Truth:
@@ -189,8 +189,8 @@ def equal_scales_evaluated() -> Truth:
     nodes = np.linspace(0.0, EDGE, 6)
     errors = sd.ErrorMap(dict.fromkeys(("EXX", "EYY", "EZZ"), (nodes, 0.01 * nodes / EDGE)), {})
     run = sd.simulate(sd.Machine(CHAIN, errors, np.zeros(3)), plan, sd.Head(), noise=sd.Noise(distance=1e-4, tilt=1e-6))
-    options = {"uncertainty": sd.ReadingUncertainty(distance=1e-4, tilt=1e-6), "full_covariance": True}
-    calibration = sd.adjust(run, plan, sd.Head(), sd.Chain(CHAIN), np.zeros(3), **options).calibration
+    options = {"uncertainty": sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6), "full_covariance": True}
+    calibration = sd.methods.adjust(run, plan, sd.Head(), sd.Chain(CHAIN), np.zeros(3), **options).calibration
     own = {name: errors.function(name, nodes) for name in ("EXX", "EYY", "EZZ")}
     return made(own, {}, covariance=calibration.covariance)
 
@@ -286,7 +286,7 @@ def of_run(truth: Truth, seed: int, samples: int) -> list[float]:
     rng = np.random.default_rng([7, seed])
     values = truth.values + truth.root @ rng.normal(size=len(truth.values))
     calibration = truth.calibration(values, truth.covariance)
-    found = sd.volume_errors(
+    found = sd.volume(
         calibration, box=truth.box, between_nodes=truth.between, ranking=False, samples=samples, seed=seed
     )
     largest, components, u, _ = truth.summary

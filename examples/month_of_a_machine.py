@@ -79,7 +79,7 @@ def read_on(day: int, plan: str, folder: Path) -> tuple[sd.Scenario, sd.Measurem
     path = folder / f"day{day}.toml"
     path.write_text(SCENARIO.format(seed=day, temperature=temperature, misalignment=misalignment) + plan)
     scenario = sd.read_scenario(path)
-    run = sd.simulate_scenario(scenario, machine_on(day))
+    run = sd.simulate(scenario, machine_on(day))
     off = {name: value + 0.1 * rng.normal() for name, value in run.channels.items() if name.startswith("temperature")}
     run = sd.Measurement(run.line, run.point, run.position, {**run.channels, **off})
     run.write(folder / f"day{day}.csv")
@@ -89,20 +89,20 @@ def read_on(day: int, plan: str, folder: Path) -> tuple[sd.Scenario, sd.Measurem
 def largest(errors: sd.ErrorMap | sd.Calibration) -> float:
     """The largest error in the volume, µm."""
     if isinstance(errors, sd.Calibration):
-        return 1e3 * sd.volume_errors(errors, ranking=False).largest
+        return 1e3 * sd.volume(errors, ranking=False).largest
     machine = sd.Machine("[w X' b Y Z t]", errors)
-    return 1e3 * sd.volume_errors(machine, box=[np.zeros(3), VOLUME], ranking=False).largest
+    return 1e3 * sd.volume(machine, box=[np.zeros(3), VOLUME], ranking=False).largest
 
 
 def main(folder: Path) -> None:
     scenario, run = read_on(0, CALIBRATION, folder)
-    baseline = sd.evaluate_scenario(scenario, run, full_covariance=True)
-    sd.write_calibration(baseline, folder / "day0.nc")
+    baseline = sd.methods.evaluate_scenario(scenario, run, full_covariance=True)
+    baseline.write(folder / "day0.nc")
     print(f"day 0: calibrated; largest error {largest(baseline):.1f} µm, in truth {largest(machine_on(0)):.1f} µm\n")
     print("day      verdict  chance    C0Y (µrad)  in truth    A0Z (µrad)  in truth   largest error (µm)  in truth")
     for day in DAYS:
         scenario, run = read_on(day, SHORT, folder)
-        found = sd.recheck_scenario(baseline, scenario, run)
+        found = sd.recheck(baseline, scenario, run)
         changed = found.probability < 0.001
         updated = found.updated
         cells = []
@@ -115,7 +115,7 @@ def main(folder: Path) -> None:
         print(f"{day:3} {said:>12} {chance:>8} {cells[0]:>22} {cells[1]:>22} {errors:>30}")
         if changed:
             baseline = updated
-            sd.write_calibration(updated, folder / f"day{day}.nc")
+            updated.write(folder / f"day{day}.nc")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import stepdiag as sd
 
 def main(scenario_file: str, run_file: str) -> None:
     scenario = sd.read_scenario(scenario_file)
-    calibration = sd.evaluate_scenario(scenario, sd.read_measurement(run_file))
+    calibration = sd.methods.evaluate_scenario(scenario, sd.read_measurement(run_file))
     for sentence in calibration.undetermined:
         print("not determined:", sentence)
 

@@ -15,14 +15,14 @@ misalignment = {line: sd.Misalignment(reflector=(100e-6, 300e-6)) for line in pl
 run = sd.simulate(machine, plan, head, misalignment=misalignment)
 
 for method in ("conventional", "enhanced", "adjustment"):
-    calibration = sd.evaluate(run, plan, head, machine.chain, method=method)
+    calibration = sd.methods.evaluate(run, plan, head, machine.chain, method=method)
     worst = sd.largest_deviations(calibration, machine.errors)["positioning"]
     print(f"{method}: positioning known to {abs(worst.value) * 1e3:.6f} µm")
 
-found = sd.adjust(run, plan, head, machine.chain)
+found = sd.methods.adjust(run, plan, head, machine.chain)
 tilts = [e.value * 1e6 for e in found.setup if e.line == "ppp" and e.quantity == "reflector"]
 print(f"the mirror stood at {tilts[0]:.3f}, {tilts[1]:.3f} µrad on ppp")
 
 scenario = sd.read_scenario("examples/scenario.toml")
-judged = sd.judge(scenario, sd.simulate_scenario(scenario))
+judged = sd.judge(scenario, sd.simulate(scenario))
 print(f"the run of examples/scenario.toml is {judged.fit}")

@@ -16,10 +16,10 @@ SEEDS = range(8)
 
 CHOICES = {
     "none": None,
-    "1 µm, 3 µrad": sd.Smoothness(translation=1e-3, rotation=3e-6),
-    "0.5 µm, 1 µrad": sd.Smoothness(translation=0.5e-3, rotation=1e-6),
-    "0.1 µm, 0.3 µrad": sd.Smoothness(translation=0.1e-3, rotation=0.3e-6),
-    "cross-validated": sd.Smoothness(cross_validated=True),
+    "1 µm, 3 µrad": sd.methods.Smoothness(translation=1e-3, rotation=3e-6),
+    "0.5 µm, 1 µrad": sd.methods.Smoothness(translation=0.5e-3, rotation=1e-6),
+    "0.1 µm, 0.3 µrad": sd.methods.Smoothness(translation=0.1e-3, rotation=0.3e-6),
+    "cross-validated": sd.methods.Smoothness(cross_validated=True),
 }
 
 FloatArray = npt.NDArray[np.float64]
@@ -29,10 +29,10 @@ def machine(**screw: float) -> sd.Machine:
     return sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=0, intervals=STEPS, **screw))
 
 
-def adjusted(virtual: sd.Machine, seed: int, smoothness: sd.Smoothness | None) -> sd.Adjustment:
+def adjusted(virtual: sd.Machine, seed: int, smoothness: sd.methods.Smoothness | None) -> sd.Adjustment:
     """Of a run with noise of 0.1 µm and 1 µrad."""
     run = sd.simulate(virtual, PLAN, sd.Head(), noise=sd.Noise(distance=0.1e-3, tilt=1e-6, seed=seed))
-    return sd.adjust(run, PLAN, sd.Head(), CHAIN, smoothness=smoothness)
+    return sd.methods.adjust(run, PLAN, sd.Head(), CHAIN, smoothness=smoothness)
 
 
 def uncertainties(found: list[sd.Adjustment], angles: bool) -> list[FloatArray]:

@@ -63,7 +63,7 @@ def row(
         )
     )
     calibration = sd.observe(scenario)[1].calibration
-    whole, shapes, parts = sd.extents(calibration, scenario.known.plan)
+    whole, shapes, parts = sd.methods.extents(calibration, scenario.known.plan)
     largest = sd.largest_uncertainties(calibration)
     sizes = [
         f"{sd.in_report_units(kind, largest[kind][0]):.2g}" if kind in largest else "-"

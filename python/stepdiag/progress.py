@@ -12,8 +12,8 @@ _TICK: Final = 0.5  # s
 class Progress:
     """Show how far a computation is; pass it as `progress` to what computes.
 
-        with sd.Progress("virtual calibrations") as progress:
-            result = sd.evaluate_uncertainty(scenario, request, progress)
+        with sd.montecarlo.Progress("virtual calibrations") as progress:
+            result = sd.montecarlo.evaluate_uncertainty(scenario, request, progress)
 
     Shows a bar in a notebook, or on standard error if that is a terminal, from the first second on. What does not call
     it shows the time that has passed. The bar disappears at the end. Elsewhere nothing is shown."""

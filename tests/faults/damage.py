@@ -65,7 +65,7 @@ def with_checksum(path: Path, original: Path) -> list[tuple[tuple[str, Any], ...
 
 def calibration(path: Path, original: Path) -> bool:
     again = path.with_name("again.csv")
-    sd.write_calibration(sd.read_calibration(path), again)
+    sd.read_calibration(path).write(again)
     return rows_of(again) == with_checksum(path, original)
 
 
@@ -90,7 +90,7 @@ def scenario(path: Path, original: Path) -> bool:
 
 
 def head(path: Path, original: Path) -> bool:
-    sd.read_head_design(path)
+    sd.optics.read_head_design(path)
     return isinstance(tomllib.loads(path.read_text("utf-8-sig")), dict)
 
 

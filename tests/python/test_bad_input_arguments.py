@@ -233,7 +233,7 @@ def test_what_makes_no_measurement_is_refused(change: dict[str, Any], names: str
         (sd.Plan, (VOLUME, 5, 5)),
         (sd.Machine, (CHAIN, "errors")),
         (sd.simulate, (1, 2, 3)),
-        (sd.evaluate, (RUN, None, None, None)),
+        (sd.methods.evaluate, (RUN, None, None, None)),
         (sd.read_measurement, (5,)),
     ],
 )

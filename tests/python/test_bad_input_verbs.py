@@ -51,12 +51,12 @@ def test_misalignment_that_is_no_pair_of_numbers_is_refused(key: str, pair: Any)
 @pytest.mark.parametrize("key", ["distance", "tilt", "spot"])
 def test_noise_and_weights_that_make_no_sense_are_refused(key: str, value: float) -> None:
     refused(sd.Noise, **{key: value}, names=f"noise {key}")
-    refused(sd.ReadingUncertainty, **{key: value}, names=f"uncertainty {key}")
+    refused(sd.methods.ReadingUncertainty, **{key: value}, names=f"uncertainty {key}")
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-300, 1e-13, 1e7, 1e300])
 def test_weight_that_no_reading_has_is_refused(value: float) -> None:
-    refused(sd.ReadingUncertainty, distance=value, names="uncertainty distance")
+    refused(sd.methods.ReadingUncertainty, distance=value, names="uncertainty distance")
 
 
 @pytest.mark.parametrize("mirror", [(10.0, 500.0), (500.0, 10.0), (1e-9, 1e-9)])
@@ -107,7 +107,7 @@ def test_evaluation_of_nonsense_is_refused(
 
     def evaluate() -> None:
         given = {"plan": SETUP.plan, "head": sd.Head(), "chain": CHAIN, "tool": (0.0, 0.0, 0.0), "method": method}
-        sd.evaluate(run, **(given | options))
+        sd.methods.evaluate(run, **(given | options))
 
     refused(evaluate, names=names)
 
@@ -124,4 +124,4 @@ def test_enhanced_evaluation_without_tilts_is_refused() -> None:
 
 def test_beams_of_another_head_are_refused() -> None:
     head = sd.Head("multi_beam", beam_offsets=[[0, 0], [20, 0], [0, 20], [9, 9]])
-    refused(sd.evaluate, alien(channels=BEAMS), SETUP.plan, head, CHAIN, names="beam")
+    refused(sd.methods.evaluate, alien(channels=BEAMS), SETUP.plan, head, CHAIN, names="beam")

@@ -32,7 +32,7 @@ def test_quickstart_shows_that_each_method_is_better_than_the_one_before() -> No
 
 def test_readme_has_the_report_of_the_example(tmp_path: Path) -> None:
     run, out = tmp_path / "run.csv", tmp_path / "calibration.csv"
-    sd.simulate_scenario(sd.read_scenario(EXAMPLES / "scenario.toml")).write(run)
+    sd.simulate(sd.read_scenario(EXAMPLES / "scenario.toml")).write(run)
     said = output_of("-m", "stepdiag", "evaluate", EXAMPLES / "scenario.toml", run, "-o", out)
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
     assert all(f"    {line}\n" in readme for line in said.splitlines()[:13])
@@ -73,7 +73,7 @@ def test_page_on_rechecks_has_the_month_of_the_example(tmp_path: Path) -> None:
 
 def test_own_measurement_goes_from_files_to_a_table(tmp_path: Path) -> None:
     scenario = EXAMPLES / "scenario.toml"
-    sd.simulate_scenario(sd.read_scenario(scenario)).write(tmp_path / "run.csv")
+    sd.simulate(sd.read_scenario(scenario)).write(tmp_path / "run.csv")
     assert output_of(EXAMPLES / "own_measurement.py", scenario, tmp_path / "run.csv").startswith("EXX at x = 400 mm")
 
 
@@ -83,7 +83,7 @@ def test_small_machine_of_figure_2_needs_no_tilts_while_its_angles_are_small(rot
     assert "rotation_urad = 2.0" in text
     scenario = sd.parse_scenario(text.replace("rotation_urad = 2.0", f"rotation_urad = {rotation}"))
     assert list(scenario.known.plan.volume) == [260.0, 420.0, 160.0]
-    found = sd.adjust_scenario(scenario, sd.simulate_scenario(scenario))
+    found = sd.methods.adjust_scenario(scenario, sd.simulate(scenario))
     assert found.verdict.fit == verdict
     if verdict == "accepted":
         worst = sd.largest_deviations(found.calibration, errors_of(scenario.truth, scenario.known))

@@ -20,9 +20,9 @@ SIMULATION: dict[str, Any] = {
     "seconds_per_reading": 2.0,
 }
 ADJUSTMENT: dict[str, Any] = {
-    "uncertainty": sd.ReadingUncertainty(distance=2e-4),
-    "setup": sd.SetupPriors(laser=1e-3),
-    "setup_by_line": {"ppp": sd.SetupPriors(reflector="fixed")},
+    "uncertainty": sd.methods.ReadingUncertainty(distance=2e-4),
+    "setup": sd.methods.SetupPriors(laser=1e-3),
+    "setup_by_line": {"ppp": sd.methods.SetupPriors(reflector="fixed")},
     "rotations": False,
     "outlier_probability": 0.0,
     "slips": "estimate",
@@ -42,25 +42,25 @@ def test_options_and_their_fields_do_the_same() -> None:
     measured = run(**SIMULATION)
     assert same_readings(measured, run(sd.SimulationOptions(**SIMULATION)))
     by_fields, whole = (
-        sd.adjust(measured, PLAN, HEAD, CHAIN, (0, 0, 0), *options, **fields).calibration
-        for options, fields in (((), ADJUSTMENT), ((sd.AdjustmentOptions(**ADJUSTMENT),), {}))
+        sd.methods.adjust(measured, PLAN, HEAD, CHAIN, (0, 0, 0), *options, **fields).calibration
+        for options, fields in (((), ADJUSTMENT), ((sd.methods.AdjustmentOptions(**ADJUSTMENT),), {}))
     )
     assert np.array_equal(by_fields.covariance, whole.covariance)
     assert by_fields.squareness == whole.squareness
 
 
 def test_virtual_calibrations_take_both_options_or_the_fields_of_both() -> None:
-    inputs = sd.UncertainInputs([], [])
+    inputs = sd.montecarlo.UncertainInputs([], [])
     fields = {"misalignment": SIMULATION["misalignment"], "repeats": 2, "uncertainty": ADJUSTMENT["uncertainty"]}
-    one = sd.VirtualCalibrations(MACHINE, PLAN, HEAD, inputs, **fields)
-    other = sd.VirtualCalibrations(
+    one = sd.montecarlo.VirtualCalibrations(MACHINE, PLAN, HEAD, inputs, **fields)
+    other = sd.montecarlo.VirtualCalibrations(
         MACHINE,
         PLAN,
         HEAD,
         inputs,
         # Noise is among the inputs, and not taken from here.
         simulation=sd.SimulationOptions(misalignment=SIMULATION["misalignment"], repeats=2, noise=SIMULATION["noise"]),
-        adjustment=sd.AdjustmentOptions(uncertainty=ADJUSTMENT["uncertainty"]),
+        adjustment=sd.methods.AdjustmentOptions(uncertainty=ADJUSTMENT["uncertainty"]),
     )
     assert same_readings(one.nominal, other.nominal)
     assert one.calibration.squareness == other.calibration.squareness
@@ -71,8 +71,8 @@ def test_virtual_calibrations_take_both_options_or_the_fields_of_both() -> None:
     [
         (lambda *o, **f: sd.simulate(MACHINE, PLAN, HEAD, *o, **f), sd.SimulationOptions(), {"repeats": 2}),
         (
-            lambda *o, **f: sd.adjust(run(), PLAN, HEAD, CHAIN, (0, 0, 0), *o, **f),
-            sd.AdjustmentOptions(),
+            lambda *o, **f: sd.methods.adjust(run(), PLAN, HEAD, CHAIN, (0, 0, 0), *o, **f),
+            sd.methods.AdjustmentOptions(),
             {"rotations": False},
         ),
     ],
@@ -86,11 +86,13 @@ def test_options_and_fields_together_are_refused(call: Callable[..., Any], optio
 @pytest.mark.parametrize("field", [{"outlier_probability": 0.02}, {"scale_uncertainty": True}])
 def test_what_many_sets_of_readings_cannot_have_is_refused(field: dict[str, Any]) -> None:
     (name,) = field
-    refused(sd.BatchEvaluator, run(), PLAN, HEAD, CHAIN, method="adjustment", names=f"{name}: expected", **field)
+    refused(
+        sd.montecarlo.BatchEvaluator, run(), PLAN, HEAD, CHAIN, method="adjustment", names=f"{name}: expected", **field
+    )
 
 
 def test_fields_are_those_that_were_given_and_defaults_those_of_the_verbs() -> None:
-    options = sd.AdjustmentOptions(**ADJUSTMENT)
+    options = sd.methods.AdjustmentOptions(**ADJUSTMENT)
     for name in ("rotations", "outlier_probability", "full_covariance"):
         assert getattr(options, name) == ADJUSTMENT[name]
     assert options.uncertainty.distance == 2e-4

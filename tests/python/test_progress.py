@@ -38,7 +38,7 @@ def terminal_of(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 def test_terminal_shows_label_and_share_and_is_clean_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = terminal_of(monkeypatch)
-    with sd.Progress("virtual calibrations") as show:
+    with sd.montecarlo.Progress("virtual calibrations") as show:
         show(250, 1000)
         wait_for(terminal, " 25%")
         show(1000, 1000)
@@ -50,13 +50,13 @@ def test_terminal_shows_label_and_share_and_is_clean_in_the_end(monkeypatch: pyt
 
 def test_what_makes_no_call_shows_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = terminal_of(monkeypatch)
-    with sd.Progress("evaluate"):
+    with sd.montecarlo.Progress("evaluate"):
         wait_for(terminal, "evaluate: 00:00")
 
 
 def test_bar_ends_with_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = terminal_of(monkeypatch)
-    with contextlib.suppress(ValueError), sd.Progress("plans") as show:
+    with contextlib.suppress(ValueError), sd.montecarlo.Progress("plans") as show:
         show(1, 2)
         wait_for(terminal, " 50%")
         raise ValueError("broken")
@@ -66,7 +66,7 @@ def test_bar_ends_with_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_short_computation_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = terminal_of(monkeypatch)
     monkeypatch.setattr(progress, "DELAY", 1e9)
-    with sd.Progress("plans") as show:
+    with sd.montecarlo.Progress("plans") as show:
         show(1, 2)
     assert terminal.getvalue() == ""
 
@@ -74,7 +74,7 @@ def test_short_computation_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_file_gets_nothing_and_tqdm_is_not_imported() -> None:
     code = (
         "import sys, stepdiag as sd; from stepdiag import progress; progress.DELAY = 0.0\n"
-        "with sd.Progress('plans') as show: show(1, 2)\n"
+        "with sd.montecarlo.Progress('plans') as show: show(1, 2)\n"
         "assert 'tqdm' not in sys.modules"
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -87,7 +87,7 @@ def test_notebook_draws_from_the_calls(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
     monkeypatch.setattr(progress, "DELAY", 0.0)
-    with sd.Progress("samples") as show:
+    with sd.montecarlo.Progress("samples") as show:
         assert show._ticking is None
         show(1, 2)
         assert " 50%" in stream.getvalue()
@@ -96,6 +96,6 @@ def test_notebook_draws_from_the_calls(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_uncertainty_tells_its_progress() -> None:
     calls: list[tuple[int, int]] = []
     scenario = sd.parse_scenario(SCENARIO)
-    request = sd.UncertaintyRequest(samples=20_000, method="enhanced")
-    sd.evaluate_uncertainty(scenario, request, lambda done, total: calls.append((done, total)))
+    request = sd.montecarlo.UncertaintyRequest(samples=20_000, method="enhanced")
+    sd.montecarlo.evaluate_uncertainty(scenario, request, lambda done, total: calls.append((done, total)))
     assert calls[-1] == (20_000, 20_000)

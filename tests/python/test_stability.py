@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 import click
 import pytest
 from places import DATA, ROOT
+from public_names import public_names
 
-import stepdiag as sd
 from stepdiag.cli.command_line import cli
 from stepdiag.config.head_keys import HeadFile
 from stepdiag.config.key_reference import keys, sections
@@ -19,7 +19,7 @@ STABLE = DATA / "stable"
 
 
 def python_names() -> Iterator[str]:
-    yield from sd.__all__
+    yield from public_names()
 
 
 def cpp_headers() -> Iterator[str]:

@@ -20,8 +20,8 @@ SOURCE_BUILD = Path("/root/source_build.csv")  # by wheel/test, from the same sc
 # Rays through the bodies of a head: Embree's work.
 TRACE = """
 import stepdiag as sd
-head = sd.Head.from_design(sd.shipped_head("beam_and_psd"))
-print([s.end.tolist() for s in sd.trace_beams(head, distance=700.0, environment=sd.Environment())])
+head = sd.Head.from_design(sd.optics.shipped_head("beam_and_psd"))
+print([s.end.tolist() for s in sd.optics.trace_beams(head, distance=700.0, environment=sd.Environment())])
 """
 OTHERS = {
     "embreex": """
@@ -90,7 +90,7 @@ def test_licences_of_all_libraries_are_there() -> None:
 
 
 def test_readings_are_those_of_the_source_build(tmp_path: Path) -> None:
-    sd.simulate_scenario(sd.read_scenario(EXAMPLES / "uncertainty.toml")).write(tmp_path / "run.csv")
+    sd.simulate(sd.read_scenario(EXAMPLES / "uncertainty.toml")).write(tmp_path / "run.csv")
     ours, theirs = ([*csv.reader(path.open())] for path in (tmp_path / "run.csv", SOURCE_BUILD))
     assert len(ours) == len(theirs)
     for our, their in zip(ours, theirs, strict=True):

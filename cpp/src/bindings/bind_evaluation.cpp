@@ -258,7 +258,7 @@ void bind_evaluation(py::module_& m) {
         .def_property_readonly("covariance_labels", &covariance_labels,
                                "(parameter, position in mm or None) of each row.")
         .def(
-            "write", [](const Calibration& c, const PathLike& path) { write_calibration(c, to_path(path)); },
+            "write_csv", [](const Calibration& c, const PathLike& path) { write_calibration(c, to_path(path)); },
             py::arg("path"),
             "Writes the calibration CSV (the covariance is not kept). Raises InvalidArgument when it cannot be "
             "written.")

@@ -551,7 +551,7 @@ static void bind_traced_head(py::module_& m) {
         "Derivatives of a traced head's readings by the six degrees of freedom of every component (along the head's "
         "axes, rotations about its own origin) and of the mirror, by indices, and by the state of the air: exact, by "
         "forward mode through the replay. Raises InvalidArgument where a beam is lost.");
-    m.def("read_head", &read_head, py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2),
+    m.def("read_signals", &read_head, py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2),
           py::arg("lateral") = zeros(2), py::arg("environment") = std::nullopt,
           py::arg("assumed_environment") = std::nullopt,
           "The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.");

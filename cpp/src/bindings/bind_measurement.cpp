@@ -148,7 +148,7 @@ void bind_measurement(py::module_& m) {
                                    return uncertainties;
                                })
         .def(
-            "write", [](const Measurement& run, const PathLike& path) { write_measurement(run, to_path(path)); },
+            "write_csv", [](const Measurement& run, const PathLike& path) { write_measurement(run, to_path(path)); },
             py::arg("path"),
             "Writes the measurement CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot "
             "be written.");

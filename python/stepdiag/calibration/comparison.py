@@ -155,7 +155,7 @@ def made_of(calibration: Calibration) -> dict[str, str]:
     return {"method": calibration.method, "date": calibration.date, "temperature": temperature}
 
 
-def compare_calibrations(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *, limit: float = 0.05) -> Comparison:
+def compare(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *, limit: float = 0.05) -> Comparison:
     """Differences B - A of all parameters that both determine, with their significance.
 
     One of the two may be an error map, such as a known truth: it is taken at the nodes of the other one, as exact.

@@ -150,7 +150,7 @@ class VolumeErrors(Displayed):
         return drawn(self)
 
 
-def volume_errors(
+def volume(
     source: Calibration | Machine,
     *,
     tool: npt.ArrayLike | None = None,
@@ -270,7 +270,7 @@ class PointErrors:
     tilt_uncertainty: FloatArray | None  # (n, 3) rad
 
 
-def errors_at_points(
+def errors_at(
     source: Calibration | Machine,
     points: npt.ArrayLike,
     *,
@@ -298,7 +298,7 @@ def errors_at_points(
 def variances_in_volume(calibration: Calibration, count: int = 5) -> FloatArray:
     """Variance of the functional point's error, summed over X, Y and Z, mm^2, at the points of a grid with so many
     positions an axis, (count^3,); NaN where a parameter is not determined. Of a calibration with covariance."""
-    points = errors_at_points(calibration, volume_grid(np.stack([np.zeros(3), calibration.volume]), count))
+    points = errors_at(calibration, volume_grid(np.stack([np.zeros(3), calibration.volume]), count))
     assert points.error_uncertainty is not None
     variances: FloatArray = (points.error_uncertainty**2).sum(axis=1)
     return variances

@@ -9,7 +9,7 @@ import numpy as np
 from stepdiag._core import Calibration, ErrorMap, Machine
 from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors, without_between_nodes
+from stepdiag.calibration.volume import Interval, VolumeErrors, volume, without_between_nodes
 from stepdiag.display import Displayed, Facts
 
 ChangeVerdict = Literal["improved", "worse", "cannot be told"]
@@ -77,7 +77,7 @@ def volume_change(comparison: Comparison) -> VolumeChange:
     intervals that make it smaller/larger). The verdict is "improved" or "worse" where that interval excludes 0. There
     is none without covariances, for evaluations of the same run, and against an error map."""
     one, other = comparison.a, comparison.b
-    a, b = (volume_errors(each, tool=one.tool, ranking=False) for each in (one, other))
+    a, b = (volume(each, tool=one.tool, ranking=False) for each in (one, other))
     reason = _no_verdict(comparison, a, b)
     known_a, known_b = (without_between_nodes(each).largest_interval for each in (a, b))
     return VolumeChange(
@@ -130,7 +130,7 @@ def _effects(comparison: Comparison) -> tuple[ParameterEffect, ...]:
     for difference in comparison.differences:
         if difference.parameter.endswith("_reversal"):
             continue  # the errors are those of positions approached in + direction
-        found = volume_errors(_machine_of(difference, a), box=[np.zeros(3), a.volume], grid=_GRID, ranking=False)
+        found = volume(_machine_of(difference, a), box=[np.zeros(3), a.volume], grid=_GRID, ranking=False)
         if found.largest > 0.0:
             effects.append(
                 ParameterEffect(difference.parameter, found.largest, found.rms, comparison.is_significant(difference))

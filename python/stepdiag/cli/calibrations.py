@@ -114,7 +114,7 @@ def report(
     from stepdiag.calibration.temperature_text import workpiece_rows
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
-    from stepdiag.report.calibration import calibration_report, functional_point_csv
+    from stepdiag.presentation.calibration import calibration_report, functional_point_csv
 
     if len(calibrations) > 2:
         raise InvalidArgument(f"expected one calibration, or an earlier one before it, got {len(calibrations)}")
@@ -168,27 +168,18 @@ def _write_page(
     words: Mapping[str, str | None],
 ) -> Calibration | None:
     """Write the page; the calibration before, if there is one."""
-    from stepdiag.io.whole_files import write_whole
     from stepdiag.page.contents import ReportRequest
-    from stepdiag.page.document import report_page
-    from stepdiag.page.pdf import find_browser, write_pdf
+    from stepdiag.page.document import write_report
     from stepdiag.units import MICROMETRE
 
     before = calibrations[0] if len(calibrations) == 2 else None
     tolerance = None if limit is None else limit * MICROMETRE
     request = ReportRequest(calibrations[-1], before, scenario, run, uncertainty, tolerance, words, logo)
     path = output.claim(*request.inputs)
-    if path.suffix.lower() == ".pdf":
-        find_browser()
     with Progress("report"):
-        page, contents = report_page(request, path)
+        contents = write_report(request, path)
     for note in contents.notes:
         tell("warning", note)
-    if path.suffix.lower() == ".pdf":
-        with Progress("Chromium prints"):
-            write_pdf(page, path)
-    else:
-        write_whole(path, page)
     return contents.before
 
 
@@ -219,12 +210,12 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
     is multiplied by the number of values compared (Bonferroni). If nodes differ, the longer table
     is interpolated. Functions whose slope is not determined in both are compared by shape.
     """
-    from stepdiag.calibration.comparison import compare_calibrations
+    from stepdiag.calibration.comparison import compare
     from stepdiag.calibration.volume_change import volume_change
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.file_kind import kind_of_file
     from stepdiag.io.whole_files import check_input
-    from stepdiag.report.comparison import comparison_report
+    from stepdiag.presentation.comparison import comparison_report
 
     written = None if output is None else output.claim(a, b)
     if not 0.0 < limit < 1.0:
@@ -235,13 +226,13 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         read_error_map(path) if kind_of_file(path) == "error map" else read_calibration(path) for path in (a, b)
     )
     try:
-        comparison = compare_calibrations(one, other, limit=limit)
+        comparison = compare(one, other, limit=limit)
     except InvalidArgument as error:
         raise InvalidArgument(f"{a}, {b}: {error}") from None
     with Progress("volumes of A and B"):
         change = volume_change(comparison)
     if written is not None:
-        from stepdiag.report.comparison import write_comparison
+        from stepdiag.presentation.comparison import write_comparison
 
         write_comparison(comparison, written)
     warnings = [*trust_warnings(a, comparison.a), *trust_warnings(b, comparison.b)]
@@ -289,8 +280,8 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
-    from stepdiag.rechecking.verification import check_other_run, verify_scenario
-    from stepdiag.report.verification import agrees, verification_report
+    from stepdiag.presentation.verification import agrees, verification_report
+    from stepdiag.rechecking.verification import check_other_run, verify
     from stepdiag.scenario.description import read_scenario
 
     if not 0.0 < alpha < 1.0:
@@ -302,7 +293,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     check_other_run(tested, run)
     measurement = read_measurement(run)
     with located(f"{calibration}, {run}"), Progress("verify"):
-        verification = verify_scenario(tested, known, measurement)
+        verification = verify(tested, known, measurement)
     warnings = trust_warnings(calibration, tested)
     warnings += input_warnings(known, run, measurement)
     if not agrees(verification, alpha):
@@ -367,13 +358,13 @@ def recheck(
     the command ends with a warning and exit code 3.
     """
     from stepdiag.calibration.finding_text import fault_text
-    from stepdiag.calibration.volume import volume_errors
+    from stepdiag.calibration.volume import volume
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.rechecking.recheck import Judged, recheck_scenario
+    from stepdiag.presentation.verification import recheck_report
+    from stepdiag.rechecking.recheck import Judged, recheck
     from stepdiag.rechecking.verification import check_other_run
-    from stepdiag.report.verification import recheck_report
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.provenance import provenance_of
 
@@ -388,8 +379,8 @@ def recheck(
     check_other_run(before, run)
     measurement = read_measurement(run)
     with located(f"{baseline}, {run}"), Progress("recheck"):
-        judged = Judged(recheck_scenario(before, known, measurement), before, alpha)
-        volume = volume_errors(judged.updated, ranking=False)
+        judged = Judged(recheck(before, known, measurement), before, alpha)
+        after = volume(judged.updated, ranking=False)
     if target is not None:
         write_calibration(judged.updated, target, provenance=provenance_of(known, run))
     warnings = trust_warnings(baseline, before)
@@ -406,9 +397,9 @@ def recheck(
         from stepdiag.objects.recheck import recheck_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(recheck_object(judged, measurement, volume, (baseline, run, target), warnings)))
+        click.echo(json_text(recheck_object(judged, measurement, after, (baseline, run, target), warnings)))
     else:
-        for line in recheck_report(judged, measurement, volume):
+        for line in recheck_report(judged, measurement, after):
             say(line)
     for warning in warnings:
         tell("warning", warning)

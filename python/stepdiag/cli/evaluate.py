@@ -86,7 +86,7 @@ def evaluate(
     from stepdiag.evaluation.judge import judge
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.report.evaluation import evaluation_report
+    from stepdiag.presentation.evaluation import evaluation_report
     from stepdiag.scenario.description import JudgedEvaluation, read_scenario
     from stepdiag.scenario.provenance import provenance_of
 
@@ -166,8 +166,8 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.fault_control import extensions, tells_all
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
-    from stepdiag.report.fault_control import control_rows, extension_rows
-    from stepdiag.report.observation import observation_report, prospect_csv, prospect_rows
+    from stepdiag.presentation.fault_control import control_rows, extension_rows
+    from stepdiag.presentation.observation import observation_report, prospect_csv, prospect_rows
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)

@@ -21,7 +21,7 @@ from stepdiag.io.outputs import (
 )
 from stepdiag.progress import Progress
 
-# Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
+# Those of stepdiag.exporting.write.FORMATS, which is slow to import; a test compares them.
 KINDS = {
     "linuxcnc-kins": KINEMATICS_TABLE,
     "isg": ISG_TABLE,
@@ -112,8 +112,8 @@ def export(
     calibration that does not determine all that the format needs, unless --incomplete is
     given. An error map is accepted as well; parameters that it lacks are 0.
     """
-    from stepdiag.export.common import ExportOptions
-    from stepdiag.export.write import check_fit, read_what_is_exported, write_export
+    from stepdiag.exporting.common import ExportOptions
+    from stepdiag.exporting.write import check_fit, read_what_is_exported, write_export
     from stepdiag.io.whole_files import check_input
 
     if to in KINDS:

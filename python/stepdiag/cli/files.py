@@ -32,8 +32,8 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     calibration is unverified (without a checksum).
     """
     from stepdiag.calibration.finding_text import UNVERIFIED
-    from stepdiag.report.file_check import Finding, examine
-    from stepdiag.report.scenario_and_run import FoundTogether, adjust_run
+    from stepdiag.presentation.file_check import Finding, examine
+    from stepdiag.presentation.scenario_and_run import FoundTogether, adjust_run
 
     tell_found = _silent if as_json else say
     found: list[tuple[Path, Finding | InvalidArgument]] = []

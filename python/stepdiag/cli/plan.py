@@ -152,7 +152,7 @@ def plan(
         volume_goal,
         with_faults,
     )
-    from stepdiag.report.plan_by_time import (
+    from stepdiag.presentation.plan_by_time import (
         advice,
         fault_advice,
         inputs_row,
@@ -231,8 +231,8 @@ def _plan_recheck(
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
     from stepdiag.planning.recheck_plans import choose, own_limit, powers
+    from stepdiag.presentation.recheck_plans import recheck_advice, recheck_plan_csv, recheck_plan_rows
     from stepdiag.rechecking.verification import ALPHA
-    from stepdiag.report.recheck_plans import recheck_advice, recheck_plan_csv, recheck_plan_rows
     from stepdiag.scenario.description import read_scenario
 
     check_input(baseline)

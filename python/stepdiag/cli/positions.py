@@ -59,7 +59,7 @@ def positions(
     from stepdiag.io.file_kind import kind_of_file
     from stepdiag.io.whole_files import check_input
     from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
-    from stepdiag.report.positions import predicted_report
+    from stepdiag.presentation.positions import predicted_report
 
     check_input(file)
     given = {"axis": axis, "at": at, "diagonal": diagonal, "from": start, "to": end, "points": points, "tool": tool}
@@ -104,7 +104,7 @@ def positions(
 def _evaluate(file: Path, as_json: bool) -> None:
     from stepdiag.positions.evaluation import evaluate_positions
     from stepdiag.positions.readings import read_positions
-    from stepdiag.report.positions import measured_report, measured_warnings
+    from stepdiag.presentation.positions import measured_report, measured_warnings
 
     readings = read_positions(file)
     try:

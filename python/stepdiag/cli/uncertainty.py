@@ -183,7 +183,7 @@ def uncertainty(
     and exit code 3: its Monte Carlo figures are those of the others.
     """
     from stepdiag.io.data_files import is_netcdf
-    from stepdiag.report.uncertainty import input_rows, opening_rows, result_rows
+    from stepdiag.presentation.uncertainty import input_rows, opening_rows, result_rows
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.uncertainty.run import UncertaintyRequest

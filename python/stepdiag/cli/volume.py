@@ -78,15 +78,15 @@ def volume(
     verdict is within, not within, or cannot be decided (ISO 14253-1, one-sided, 95 %). The exit code
     is 0 for each of them, and 3 if the fit of the calibration is rejected; programs read --json.
     """
-    from stepdiag.calibration.volume import volume_errors
+    from stepdiag.calibration.volume import volume
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.report.volume import volume_report
+    from stepdiag.presentation.volume import volume_report
 
     check_input(calibration)
     read = read_calibration(calibration)
     with Progress("draws of the covariance") as progress:
-        found = volume_errors(
+        found = volume(
             read,
             tool=tool,
             box=box,

@@ -97,7 +97,7 @@ def run_case(
     run = _core.read_measurement(here / "run.csv")
     say("evaluate")
     calibration = adjust_scenario(scenario.known, run, full_covariance=True).calibration
-    calibration.write(table)
+    calibration.write_csv(table)
     say("measure the compensated machine")
     after = controller.do(Job(compensated, program, later / "run.csv", points, table, temperature), say)
     cold = None

@@ -114,7 +114,7 @@ def run_case(case: Case, folder: Path) -> Result:
     calibrations = {}
     for method in METHODS:
         calibrations[method] = evaluate_scenario(scenario.known, measurement, method=method)
-        calibrations[method].write(here / f"{method}.csv")
+        calibrations[method].write_csv(here / f"{method}.csv")
     return Result(case, scenario, scenario.machine().errors, measurement, calibrations)
 
 

@@ -80,6 +80,20 @@ class Judgement:
         return self.calibration.fit_reasons
 
 
+def evaluate(
+    scenario: Scenario | Known,
+    measurement: Measurement,
+    *,
+    method: Literal["adjustment", "enhanced", "conventional"] = "adjustment",
+    full_covariance: bool = False,
+) -> Calibration:
+    """Evaluate a run of a scenario's plan: the calibration, with the verdict of `judge` in `fit` and `fit_reasons`.
+
+    It is what the command `evaluate` writes. Arguments and errors are those of `judge`, which gives all that was found.
+    """
+    return judge(scenario, measurement, method=method, full_covariance=full_covariance).calibration
+
+
 def judge(
     scenario: Scenario | Known,
     measurement: Measurement,

@@ -81,11 +81,11 @@ def _draw_calibration(file: Path, truth: Path | None, *, volume: bool) -> tuple[
     if volume:
         if truth is not None:
             raise InvalidArgument("`volume`: expected a calibration alone, without an error map")
-        from stepdiag.calibration.volume import volume_errors
+        from stepdiag.calibration.volume import volume as errors_in_volume
         from stepdiag.figures.volume import draw_volume
 
         with located(str(file)):
-            return draw_volume(volume_errors(calibration, ranking=False), file.name), {file: calibration}
+            return draw_volume(errors_in_volume(calibration, ranking=False), file.name), {file: calibration}
     from stepdiag.figures.calibration import draw_calibration
 
     errors: ErrorMap | None = None if truth is None else read_error_map(truth)
@@ -93,12 +93,12 @@ def _draw_calibration(file: Path, truth: Path | None, *, volume: bool) -> tuple[
 
 
 def _draw_difference(a: Path, b: Path) -> tuple[Figure, dict[Path, Calibration]]:
-    from stepdiag.calibration.comparison import compare_calibrations
+    from stepdiag.calibration.comparison import compare
     from stepdiag.figures.comparison import draw_comparison
 
     one, other = _both(a, b)
     with located(f"{a}, {b}"):
-        comparison = compare_calibrations(one, other)
+        comparison = compare(one, other)
     return draw_comparison(comparison, f"{a.name}, {b.name}"), {a: one, b: other}
 
 

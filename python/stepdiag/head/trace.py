@@ -114,7 +114,7 @@ def travel_limits(head: _core.Head, distance: float) -> dict[str, Limits]:
 
 
 def _is_read(head: _core.Head, distance: float, tilt: Pair, lateral: Pair) -> bool:
-    readings = _core.read_head(head, distance=distance, tilt=tilt, lateral=lateral)
+    readings = _core.read_signals(head, distance=distance, tilt=tilt, lateral=lateral)
     return all(value is not None for value in readings.values())
 
 

@@ -48,7 +48,7 @@ def write_measurement(measurement: Measurement, path: str | PathLike[str]) -> No
 
     Raises InvalidArgument naming the file if it cannot be written."""
     if not is_netcdf(path):
-        write_by_core(path, measurement.write)
+        write_by_core(path, measurement.write_csv)
         return
     from stepdiag.io.netcdf_write import write_measurement_netcdf
 
@@ -86,7 +86,7 @@ def write_calibration(
         calibration = calibration.with_between_nodes(between_nodes)
     dated = calibration.dated(calibration.date or date_of_today())
     if not is_netcdf(path):
-        write_by_core(path, dated.write)
+        write_by_core(path, dated.write_csv)
         return dated
     from stepdiag.io.netcdf_write import write_calibration_netcdf
 

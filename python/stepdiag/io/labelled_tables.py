@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
@@ -55,6 +56,25 @@ def measurement_table(measurement: Measurement) -> xr.Dataset:
     for name, value in measurement.standard_uncertainty.items():
         variables[f"{name}_u"] = ("reading", value, _uncertainty_of(variables[name][2]))
     return xr.Dataset(variables, coordinates, {"title": "step-diagonal measurement"})
+
+
+def calibration_frame(calibration: Calibration) -> pd.DataFrame:
+    """A row for each value of a calibration: parameter, position, value, standard_uncertainty, unit."""
+    parts = []
+    for name in calibration:
+        position, value, uncertainty = calibration[name]
+        parts.append(
+            pd.DataFrame(
+                {
+                    "parameter": name,
+                    "position": np.atleast_1d(np.nan if position is None else position),
+                    "value": np.atleast_1d(value),
+                    "standard_uncertainty": np.atleast_1d(uncertainty),
+                    "unit": units_of(name.removesuffix("_reversal")),
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)
 
 
 def position_axis(coordinates: dict[str, Any], name: str, position: Any) -> str:

@@ -9,8 +9,8 @@ from typing_extensions import TypedDict
 from stepdiag._core import InvalidArgument, __version__
 from stepdiag.objects.calibration import Fit, fit_of
 from stepdiag.objects.evaluation import NamedMistake, mistake_of
-from stepdiag.report.file_check import Finding
-from stepdiag.report.scenario_and_run import FoundTogether
+from stepdiag.presentation.file_check import Finding
+from stepdiag.presentation.scenario_and_run import FoundTogether
 
 
 class CheckedFile(TypedDict):

@@ -34,7 +34,7 @@ from stepdiag.objects.calibration import (
 )
 from stepdiag.objects.conditions import PositioningParts, UsedConditions, budget_object, conditions_object
 from stepdiag.objects.writer import in_unit, measured, number
-from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
+from stepdiag.presentation.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings

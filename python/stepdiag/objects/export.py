@@ -8,8 +8,8 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, __version__
-from stepdiag.export.left_in_volume import ErrorSize
-from stepdiag.export.result import Export
+from stepdiag.exporting.left_in_volume import ErrorSize
+from stepdiag.exporting.result import Export
 from stepdiag.objects.calibration import Fit, fit_of
 from stepdiag.objects.writer import in_unit
 

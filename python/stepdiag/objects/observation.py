@@ -28,7 +28,7 @@ from stepdiag.objects.evaluation import (
 from stepdiag.parameters import KINDS
 from stepdiag.planning.fault_control import Extension
 from stepdiag.planning.observation import Prospect, extents, growth
-from stepdiag.report.prior_effects import cosine_rows, drift_rows
+from stepdiag.presentation.prior_effects import cosine_rows, drift_rows
 from stepdiag.scenario.known import Known
 
 

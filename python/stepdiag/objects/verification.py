@@ -10,7 +10,7 @@ from stepdiag._core import Calibration, LineDeviation, Measurement, Verification
 from stepdiag.objects.calibration import Fit, fit_of
 from stepdiag.objects.evaluation import Faults, faults_of
 from stepdiag.objects.writer import in_unit, measured
-from stepdiag.report.verification import agrees
+from stepdiag.presentation.verification import agrees
 
 
 class VerifiedLine(TypedDict):

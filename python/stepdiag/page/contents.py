@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Measurement
-from stepdiag.calibration.comparison import Comparison, compare_calibrations
+from stepdiag.calibration.comparison import Comparison, compare
 from stepdiag.calibration.volume_change import VolumeChange, volume_change
 from stepdiag.evaluation.judge import Judgement, judge
 from stepdiag.io.adjustment_read import FitDetails, details_of, read_fit_details
@@ -118,7 +118,7 @@ def read_contents(request: ReportRequest) -> Contents:
     if request.before is not None:
         before = read_calibration(request.before)
         try:
-            comparison = compare_calibrations(before, calibration)
+            comparison = compare(before, calibration)
         except InvalidArgument as error:
             raise InvalidArgument(f"{request.before}, {request.calibration}: {error}") from None
     folder = Path() if request.scenario is None else request.scenario.parent

@@ -5,16 +5,19 @@ import gzip
 import hashlib
 import importlib.util
 import json
+import tempfile
 from importlib.resources import files
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stepdiag._core import Calibration, InvalidArgument, __version__
+from stepdiag._core import Adjustment, Calibration, InvalidArgument, __version__
 from stepdiag.calibration.finding_text import headline, is_valid
 from stepdiag.calibration.volume import judged
 from stepdiag.io.file_kind import PAGE_BEGINS
+from stepdiag.io.whole_files import write_whole
 from stepdiag.objects.evaluation import mistake_of
 from stepdiag.objects.report import report_object
 from stepdiag.objects.volume import volume_object
@@ -22,9 +25,11 @@ from stepdiag.page.budget import budget_section
 from stepdiag.page.contents import Contents, ReportRequest, read_contents
 from stepdiag.page.curves import curves_section, squareness_section
 from stepdiag.page.figure import Figures
+from stepdiag.page.header import TITLES
 from stepdiag.page.html import Markup, element, markup
 from stepdiag.page.look import BAND, LAYOUT
 from stepdiag.page.numbers import moment
+from stepdiag.page.pdf import find_browser, write_pdf
 from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
 from stepdiag.page.volume import ErrorInVolume, drawing_of, error_grid, error_in_volume, volume_section
 from stepdiag.page.words import (
@@ -39,6 +44,62 @@ from stepdiag.page.words import (
     verdict_block,
 )
 from stepdiag.style import COLOUR
+
+
+def report(
+    calibration: Calibration | Adjustment | str | PathLike[str],
+    output: str | PathLike[str],
+    *,
+    before: str | PathLike[str] | None = None,
+    scenario: str | PathLike[str] | None = None,
+    run: str | PathLike[str] | None = None,
+    uncertainty: str | PathLike[str] | None = None,
+    limit: float | None = None,
+    logo: str | PathLike[str] | None = None,
+    **header: str,
+) -> list[str]:
+    """Write the report of a calibration, as `stepdiag report -o` does: one HTML file, or a PDF. Returns notes.
+
+    Args:
+        calibration: what was found, or its file. An Adjustment, and its netCDF file, has set-up and residuals.
+        output: the file to write, .html or .pdf (which needs Chromium).
+        before: file of an earlier calibration of the machine.
+        scenario: its file: header ([report]) and measured lines.
+        run: file of the measurement: temperatures, and residuals where the calibration has none.
+        uncertainty: file of an uncertainty result (.nc): the budget.
+        limit: of the largest error in the volume, mm.
+        logo: PNG or SVG picture.
+        header: what its header says: customer, machine, serial_number, operator, instrument, certificate, conditions.
+
+    Raises:
+        InvalidArgument: files are not sound or do not belong together; the header has other keys; Plotly or Chromium
+            is missing.
+    """
+    for key in header:
+        if key not in TITLES:
+            raise InvalidArgument(f"`{key}`: expected one of {', '.join(TITLES)}")
+    with tempfile.TemporaryDirectory(prefix="stepdiag-") as folder:
+        if isinstance(calibration, Calibration | Adjustment):
+            file = Path(folder) / "calibration.nc"
+            calibration.write(file)
+        else:
+            file = Path(calibration)
+        others = (None if path is None else Path(path) for path in (before, scenario, run, uncertainty))
+        request = ReportRequest(file, *others, limit, header, None if logo is None else Path(logo))
+        return list(write_report(request, Path(output)).notes)
+
+
+def write_report(request: ReportRequest, output: Path) -> Contents:
+    """Write a page, or the PDF of it, by the name's end. Returns what it was made from."""
+    is_pdf = output.suffix.lower() == ".pdf"
+    if is_pdf:
+        find_browser()
+    page, contents = report_page(request, output)
+    if is_pdf:
+        write_pdf(page, output)
+    else:
+        write_whole(output, page)
+    return contents
 
 
 def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:

@@ -10,7 +10,7 @@ from stepdiag.page.figure import Figures, value_table, values
 from stepdiag.page.html import Markup, element, listed, markup, section, table
 from stepdiag.page.look import BAND, GRID, LINE, MARK
 from stepdiag.page.numbers import shown
-from stepdiag.report.setup_table import setup_table
+from stepdiag.presentation.setup_table import setup_table
 from stepdiag.style import SERIES
 from stepdiag.units import report_value
 

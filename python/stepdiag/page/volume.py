@@ -10,7 +10,7 @@ import numpy as np
 from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.calibration.temperature_text import temperature_mark
-from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
+from stepdiag.calibration.volume import Interval, VolumeErrors, volume
 from stepdiag.page.contents import Contents
 from stepdiag.page.figure import rounded, value_table, values
 from stepdiag.page.html import Markup, element, section, table
@@ -36,7 +36,7 @@ def error_in_volume(calibration: Calibration, limit: float | None) -> ErrorInVol
     """The figures, as `stepdiag volume` has them, and what is drawn.
 
     Raises InvalidArgument for a limit that is not positive."""
-    return ErrorInVolume(volume_errors(calibration, limit=limit), *error_grid(calibration))
+    return ErrorInVolume(volume(calibration, limit=limit), *error_grid(calibration))
 
 
 def error_grid(calibration: Calibration) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:

@@ -15,7 +15,7 @@ from stepdiag.config.toml_text import located
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import not_measured
 from stepdiag.planning.plan_by_time import ALIKE, Candidate
-from stepdiag.rechecking.recheck import Judged, farthest_move, recheck_scenario
+from stepdiag.rechecking.recheck import Judged, farthest_move, recheck
 from stepdiag.rechecking.verification import ALPHA
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.known import runs_of
@@ -191,7 +191,7 @@ def power_of(
     )
     try:
         run = simulate_scenario(Scenario(planned, truth_of(TruthKeys(), {}, planned)), baseline.to_error_map())
-        found = recheck_scenario(baseline, planned, run)
+        found = recheck(baseline, planned, run)
     except InvalidArgument as error:
         return Power(candidate, seconds, trouble=str(error))
     smallest = found.smallest_changes_seen(alpha=alpha, power=POWER)

@@ -29,7 +29,7 @@ CHANGE_UNITS: Final = {
 }
 
 
-def recheck_scenario(baseline: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Recheck:
+def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Recheck:
     """Test whether a machine has changed since its calibration, and estimate the change.
 
     The machine is the baseline plus a change with low-order terms (`[change]` of the scenario). Both

@@ -15,7 +15,7 @@ from stepdiag.scenario.known import Known
 ALPHA: Final = 0.001
 
 
-def verify_scenario(calibration: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Verification:
+def verify(calibration: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Verification:
     """Predict the readings of a scenario's run from a calibration, and judge the deviations.
 
     How head and mirror stood is estimated from the readings, with the priors of `[adjustment]`; the

@@ -23,7 +23,7 @@ from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import Stopped
 from stepdiag.io.data_files import read_measurement
-from stepdiag.report.file_check import examine
+from stepdiag.presentation.file_check import examine
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.order_of_run import Visit
 from stepdiag.twin.server import Twin

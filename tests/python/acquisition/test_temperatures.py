@@ -21,7 +21,7 @@ from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Stopped
 from stepdiag.io.data_files import read_measurement
-from stepdiag.report.file_check import examine
+from stepdiag.presentation.file_check import examine
 from stepdiag.scenario.description import Scenario, evaluate_scenario, parse_scenario
 from stepdiag.scenario.order_of_run import Visit
 from stepdiag.twin.server import Twin

@@ -39,8 +39,8 @@ def adjusted(
     text: str, run: sd.Measurement | None = None, *, full_covariance: bool = True
 ) -> tuple[sd.Calibration, sd.Measurement]:
     scenario = parse_scenario(text)
-    run = sd.simulate_scenario(scenario) if run is None else run
-    return sd.adjust_scenario(scenario, run, full_covariance=full_covariance).calibration, run
+    run = sd.simulate(scenario) if run is None else run
+    return sd.methods.adjust_scenario(scenario, run, full_covariance=full_covariance).calibration, run
 
 
 def longer(run: sd.Measurement, part: float) -> sd.Measurement:
@@ -137,15 +137,15 @@ def test_independent_sensors_of_the_air_add_as_squares() -> None:
 def test_a_known_scale_is_corrected_in_every_method() -> None:
     """A simulated instrument that reads 50 ppm too much gives the calibration of a perfect one, to rounding."""
     quiet = LARGE.replace("distance_um = 0.1", "distance_um = 0.0")
-    perfect = sd.simulate_scenario(parse_scenario(quiet))
+    perfect = sd.simulate(parse_scenario(quiet))
     wrong = parse_scenario(quiet + instrument(scale_ppm=50.0))
-    run = sd.simulate_scenario(wrong)
+    run = sd.simulate(wrong)
     assert run.channels["distance"] == pytest.approx(perfect.channels["distance"] * 1.00005, rel=1e-15)
     for method in ("adjustment", "enhanced"):
-        expected = sd.evaluate_scenario(parse_scenario(quiet), perfect, method=method)
-        found = sd.evaluate_scenario(wrong, run, method=method)
+        expected = sd.methods.evaluate_scenario(parse_scenario(quiet), perfect, method=method)
+        found = sd.methods.evaluate_scenario(wrong, run, method=method)
         assert values_of(found) == pytest.approx(values_of(expected), abs=1e-9)
-        uncorrected = sd.evaluate_scenario(parse_scenario(quiet), run, method=method)
+        uncorrected = sd.methods.evaluate_scenario(parse_scenario(quiet), run, method=method)
         off = uncorrected.functions["EXX"][1][-1] - expected.functions["EXX"][1][-1]
         assert off == pytest.approx(50e-6 * 800.0, rel=1e-3)
 
@@ -163,7 +163,7 @@ def test_virtual_calibrations_scatter_by_what_the_adjustment_states() -> None:
     def propagated(text: str) -> tuple[float, dict[str, np.ndarray]]:
         of = virtual_calibrations(parse_scenario(text), seed=1)
         places = [(output.name, output.position) for output in of.outputs]
-        found = sd.propagate(of)
+        found = sd.montecarlo.propagate(of)
         return float(found.standard_uncertainty[places.index(("EXX", 800.0))]), dict(found.budget)
 
     alone, run = adjusted(LARGE)
@@ -190,7 +190,7 @@ def test_the_budget_adds_up_and_says_what_is_not_stated() -> None:
 
 def test_a_linear_method_says_that_it_counts_noise_alone() -> None:
     scenario = parse_scenario(LARGE + instrument(u_scale_ppm=0.5))
-    found = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario), method="enhanced")
+    found = sd.methods.evaluate_scenario(scenario, sd.simulate(scenario), method="enhanced")
     assert "instrument's scale not counted by this method" in found.budget
 
 
@@ -201,7 +201,7 @@ def test_file_and_object_have_conditions_and_budget(
     """And the page, the report of a file, and its exports know them."""
     text = LARGE + STEEL + instrument(scale_ppm=1.5, u_scale_ppm=0.5, u_air_pressure_hpa=2.0)
     (tmp_path / "s.toml").write_text(text)
-    sd.simulate_scenario(parse_scenario(text)).write(tmp_path / "run.csv")
+    sd.simulate(parse_scenario(text)).write(tmp_path / "run.csv")
     calibration = tmp_path / f"c.{ending}"
     main(["evaluate", str(tmp_path / "s.toml"), str(tmp_path / "run.csv"), "-o", str(calibration), "--json"])
     found = json.loads(capsys.readouterr().out)
@@ -238,9 +238,11 @@ def test_the_index_of_recorded_air_is_told(tmp_path: Path) -> None:
         LARGE + '\n[environment]\nreadings = "constant_index"\ntemperature_c = 23.0\nassumed = {temperature_c = 20.0}\n'
     )
     scenario = parse_scenario(text)
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     run = with_channels(run, {"air_temperature": np.linspace(22.0, 24.0, len(run))})
-    (row,) = [row for row in sd.evaluate_scenario(scenario, run).conditions if row.startswith("index of that air")]
+    (row,) = [
+        row for row in sd.methods.evaluate_scenario(scenario, run).conditions if row.startswith("index of that air")
+    ]
     told = [float(word.rstrip(",")) for word in row.split() if word.startswith("1.000")]
     air = [edlen_index(t, 101325.0, 0.5, 1530.0) for t in (24.0, 22.0, 20.0)]
     assert told == pytest.approx(air, abs=5e-8)
@@ -248,9 +250,9 @@ def test_the_index_of_recorded_air_is_told(tmp_path: Path) -> None:
 
 def test_a_relative_uncertainty_that_is_none_is_refused() -> None:
     scenario = parse_scenario(LARGE)
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     known = scenario.known
     for name in ("distance_scale_uncertainty", "air_index_uncertainty"):
         for wrong in (-1e-6, 1.0, float("nan")):
             with pytest.raises(sd.InvalidArgument, match=f"adjustment {name}: expected a part of at least 0"):
-                sd.adjust(run, known.plan, known.head, known.chain, known.tool, **{name: wrong})
+                sd.methods.adjust(run, known.plan, known.head, known.chain, known.tool, **{name: wrong})

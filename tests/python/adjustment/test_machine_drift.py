@@ -17,7 +17,7 @@ import stepdiag as sd
 
 RATE = (5e-3 / 3600.0, -3e-3 / 3600.0, 12e-3 / 3600.0)  # mm/s
 WIDE = (1.0, 1.0, 1.0)
-ANY = sd.PlausibleLimits(positioning=1.0, translation=1e3, rotation=1.0)
+ANY = sd.methods.PlausibleLimits(positioning=1.0, translation=1e3, rotation=1.0)
 STEEL = (11.5e-6, 11.5e-6, 11.5e-6)
 
 
@@ -88,7 +88,7 @@ def test_expansion_and_drift_are_told_apart() -> None:
     scenario = replace(drifting(ALL_CHAINS[0]), scales=scales)
     table = random_table(np.random.default_rng(5), scenario.volume, scenario.steps)
     run = measured(reference.simulate(scenario, table))
-    known = sd.KnownExpansion(expansion_of(scales), (1e-6,) * 3, one_coefficient=True, sensor_uncertainty=0.0)
+    known = sd.methods.KnownExpansion(expansion_of(scales), (1e-6,) * 3, one_coefficient=True, sensor_uncertainty=0.0)
     found = adjust(run, scenario, **fixed_drift("ideal"), machine_drift=sd.MachineDrift(WIDE), expansion=known)
     assert_recovered(found, table, LIMIT["ideal"])
 
@@ -116,10 +116,10 @@ def test_linear_evaluations_and_batches_take_a_run_with_check_points() -> None:
     with_returns = measured(reference.simulate(scenario, table))
     plain = replace(scenario, check_points=(0, 0))
     without = measured(reference.simulate(plain, table))
-    uncertainty = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6)
+    uncertainty = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6)
     for method in ("enhanced", "conventional"):
         a, b = (
-            sd.evaluate(
+            sd.methods.evaluate(
                 run, plan_of(s), head_of(s), s.chain, s.tool, method=method, uncertainty=uncertainty, plausible=ANY
             )
             for run, s in ((with_returns, scenario), (without, plain))
@@ -135,12 +135,12 @@ def test_batches_say_what_single_evaluations_say(method: str) -> None:
     rng = np.random.default_rng(5)
     table = random_table(rng, scenario.volume, scenario.steps)
     run = measured(reference.simulate(scenario, table))
-    options = sd.AdjustmentOptions(
-        uncertainty=sd.ReadingUncertainty(distance=1e-4, tilt=1e-6),
-        setup=sd.SetupPriors(drift="fixed"),
+    options = sd.methods.AdjustmentOptions(
+        uncertainty=sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6),
+        setup=sd.methods.SetupPriors(drift="fixed"),
         machine_drift=sd.MachineDrift([20e-3 / 3600.0] * 3),
     )
-    batch = sd.BatchEvaluator(
+    batch = sd.montecarlo.BatchEvaluator(
         run,
         plan_of(scenario),
         head_of(scenario),
@@ -153,9 +153,11 @@ def test_batches_say_what_single_evaluations_say(method: str) -> None:
     readings = np.stack([other.channels[name] for name in ("distance", "alpha", "beta")], axis=1)[None]
     values = batch.evaluate(readings)[0]
     single = (
-        sd.adjust(other, plan_of(scenario), head_of(scenario), scenario.chain, scenario.tool, options).calibration
+        sd.methods.adjust(
+            other, plan_of(scenario), head_of(scenario), scenario.chain, scenario.tool, options
+        ).calibration
         if method == "adjustment"
-        else sd.evaluate(
+        else sd.methods.evaluate(
             other,
             plan_of(scenario),
             head_of(scenario),

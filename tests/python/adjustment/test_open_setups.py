@@ -29,10 +29,10 @@ def adjusted(distance: float) -> tuple[sd.Measurement, sd.Adjustment]:
     lost = [place in LOST for place in zip(run.line, run.point, strict=True)]
     channels["distance"] = np.where(lost, np.nan, channels["distance"])
     run = sd.Measurement(run.line, run.point, run.position, channels)
-    stated = sd.ReadingUncertainty(distance=distance, tilt=1e-6)
+    stated = sd.methods.ReadingUncertainty(distance=distance, tilt=1e-6)
     options = {"uncertainty": stated, "search_faults": False}
-    found = sd.adjust(run, plan, sd.Head(), machine.chain, full_covariance=True, **options)
-    without = sd.adjust(run, plan, sd.Head(), machine.chain, **options)
+    found = sd.methods.adjust(run, plan, sd.Head(), machine.chain, full_covariance=True, **options)
+    without = sd.methods.adjust(run, plan, sd.Head(), machine.chain, **options)
     assert sorted(uncertainties(found.calibration)) == sorted(uncertainties(without.calibration))
     return run, found
 
@@ -49,7 +49,7 @@ def uncertainties(calibration: sd.Calibration) -> list[float]:
 @pytest.mark.parametrize("distance", [1e-4, 1e-5, 1e-6, 1e-7])
 def test_calibration_with_covariance_is_written_and_read(distance: float, tmp_path: Path) -> None:
     run, found = adjusted(distance)
-    sd.write_calibration(found, tmp_path / "calibration.nc", measurement=run)
+    found.write(tmp_path / "calibration.nc", measurement=run)
     read = sd.read_calibration(tmp_path / "calibration.nc").covariance
     covariance = found.calibration.covariance
     assert np.array_equal(read, covariance)

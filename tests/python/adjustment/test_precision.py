@@ -42,7 +42,7 @@ def simulated(layout: str, size: float, noise: float, *, seed: int = 1, errors: 
         noise=sd.Noise(noise * size, of_tilts, of_tilts * size, seed) if noise else sd.Noise(),
         misalignment={line: sd.Misalignment(reflector=errors * np.array([1e-4, 3e-4])) for line in LINES},
     )
-    stated = sd.ReadingUncertainty(distance=(noise or 1e-7) * size, tilt=of_tilts, spot=of_tilts * size)
+    stated = sd.methods.ReadingUncertainty(distance=(noise or 1e-7) * size, tilt=of_tilts, spot=of_tilts * size)
     return machine, plan, head, run, stated
 
 
@@ -59,7 +59,7 @@ def simulated(layout: str, size: float, noise: float, *, seed: int = 1, errors: 
 )
 def test_noise_of_any_size_is_explained_on_machines_of_any_size(layout: str, size: float, noise: float) -> None:
     machine, plan, head, run, stated = simulated(layout, size, noise)
-    found = sd.adjust(run, plan, head, machine.chain, uncertainty=stated)
+    found = sd.methods.adjust(run, plan, head, machine.chain, uncertainty=stated)
     assert found.verdict.fit == "accepted"
     assert not found.calibration.undetermined
     # Five standard deviations of a variance of that many degrees of freedom.
@@ -79,8 +79,8 @@ def test_what_cannot_be_weighed_is_replaced_and_values_stay_within_their_uncerta
 ) -> None:
     # Distances to 1 fm to 0.1 nm of a metre, beside tilts of 10 µrad.
     machine, plan, head, run, _ = simulated(layout, 1e3, 0.0)
-    uncertainty = sd.ReadingUncertainty(distance=stated, tilt=1e-5, spot=1e-2)
-    found = sd.adjust(run, plan, head, machine.chain, uncertainty=uncertainty)
+    uncertainty = sd.methods.ReadingUncertainty(distance=stated, tilt=1e-5, spot=1e-2)
+    found = sd.methods.adjust(run, plan, head, machine.chain, uncertainty=uncertainty)
     distances = [rounded for rounded in found.rounded if rounded.channel.startswith("d")]
     assert len(distances) == (3 if layout == "multi_beam" else 1)
     assert all(rounded.cause == "weights" and rounded.stated == stated < rounded.used for rounded in distances)
@@ -94,7 +94,7 @@ def test_what_cannot_be_weighed_is_replaced_and_values_stay_within_their_uncerta
 @pytest.mark.parametrize("size", [10.0, 1e3, 1e5])
 def test_a_simulation_without_noise_is_unchecked(layout: str, size: float) -> None:
     machine, plan, head, run, stated = simulated(layout, size, 0.0)
-    verdict = sd.adjust(run, plan, head, machine.chain, uncertainty=stated).verdict
+    verdict = sd.methods.adjust(run, plan, head, machine.chain, uncertainty=stated).verdict
     assert verdict.fit == "unchecked"
     assert [reason.finding for reason in verdict.reasons] == ["no_noise"]
 
@@ -107,8 +107,8 @@ def with_decimals(run: sd.Measurement, step: float) -> sd.Measurement:
 
 def test_the_step_of_decimals_takes_the_place_of_a_smaller_uncertainty() -> None:
     machine, plan, head, run, _ = simulated("ideal", 1e3, 1e-9)
-    stated = sd.ReadingUncertainty(distance=1e-6, tilt=1e-9)
-    found = sd.adjust(with_decimals(run, 1e-3), plan, head, machine.chain, uncertainty=stated)
+    stated = sd.methods.ReadingUncertainty(distance=1e-6, tilt=1e-9)
+    found = sd.methods.adjust(with_decimals(run, 1e-3), plan, head, machine.chain, uncertainty=stated)
     (rounded,) = found.rounded
     assert (rounded.channel, rounded.cause) == ("distance", "decimals")
     assert (rounded.stated, rounded.step) == (1e-6, pytest.approx(1e-3))
@@ -118,7 +118,7 @@ def test_the_step_of_decimals_takes_the_place_of_a_smaller_uncertainty() -> None
 
 def test_round_numbers_of_a_machine_without_errors_are_no_decimals() -> None:
     machine, plan, head, run, _ = simulated("ideal", 1e3, 0.0, errors=0.0)
-    stated = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6)
-    found = sd.adjust(run, plan, head, machine.chain, uncertainty=stated)
+    stated = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6)
+    found = sd.methods.adjust(run, plan, head, machine.chain, uncertainty=stated)
     assert found.rounded == []
     assert found.verdict.fit == "unchecked"

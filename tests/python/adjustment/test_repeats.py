@@ -24,7 +24,7 @@ def adjusted(layout: str, runs: int) -> sd.Adjustment:
     plan = sd.Plan(VOLUME, DIAGONALS, 4, scale_lines=SCALE_LINES)
     head = HEADS[layout]
     run = sd.simulate(machine, plan, head, repeats=runs)
-    return sd.adjust(run, plan, head, CHAIN)
+    return sd.methods.adjust(run, plan, head, CHAIN)
 
 
 @pytest.mark.parametrize("layout", HEADS)

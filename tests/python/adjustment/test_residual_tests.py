@@ -34,7 +34,7 @@ def noisy(
 
 
 def adjust(run: sd.Measurement, **options: object) -> sd.Adjustment:
-    return sd.adjust(run, PLAN, sd.Head(), CHAIN, (0, 0, 0), **{"outlier_probability": 0.0, **options})
+    return sd.methods.adjust(run, PLAN, sd.Head(), CHAIN, (0, 0, 0), **{"outlier_probability": 0.0, **options})
 
 
 def on(run: sd.Measurement, line: str) -> Rows:
@@ -101,8 +101,8 @@ def test_a_trend_has_the_size_that_it_has_as_an_unknown_and_then_leaves_none() -
         return np.where(on(run, "ppp") & (name == "distance"), 1e-6 * run.channels["time"], 0.0)
 
     run = noisy(TWICE, offset=drift)
-    known = adjust(run, one_setup_per_line=True, setup=sd.SetupPriors(drift="fixed"))
-    free = adjust(run, one_setup_per_line=True, setup_by_line={"ppp": sd.SetupPriors(drift="free")})
+    known = adjust(run, one_setup_per_line=True, setup=sd.methods.SetupPriors(drift="fixed"))
+    free = adjust(run, one_setup_per_line=True, setup_by_line={"ppp": sd.methods.SetupPriors(drift="free")})
     trend, *others = (r for r in known.verdict.reasons if r.finding == "trend")
     (rate,) = (e for e in free.setup if e.quantity == "drift" and e.line == "ppp")
     span = np.ptp(run.channels["time"][on(run, "ppp")])

@@ -14,7 +14,7 @@ import stepdiag as sd
 
 STEPS = 10
 FACTOR = 1.959963984540054
-UNCERTAINTY = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=2e-3)
+UNCERTAINTY = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=2e-3)
 PER_HOUR = 1e-3 / 3600.0  # um/h in mm/s
 ASIDE = 1e-3
 
@@ -37,7 +37,7 @@ def run_of(
 
 
 def adjusted(run: sd.Measurement, plan: sd.Plan, head: sd.Head | None = None, **told: Any) -> sd.Adjustment:
-    return sd.adjust(run, plan, head or sd.Head(), CHAIN, uncertainty=UNCERTAINTY, **told)
+    return sd.methods.adjust(run, plan, head or sd.Head(), CHAIN, uncertainty=UNCERTAINTY, **told)
 
 
 def scale_of(adjustment: sd.Adjustment, seed: int, axis: str) -> tuple[float, float]:
@@ -58,7 +58,7 @@ HEADS = {
     "psd": (sd.Head("psd", psd_distance=50.0), {}),
     "multi_beam": (
         sd.Head("multi_beam", beam_offsets=[[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]]),
-        {"setup": sd.SetupPriors(beam_constants="fixed")},
+        {"setup": sd.methods.SetupPriors(beam_constants="fixed")},
     ),
 }
 
@@ -114,7 +114,7 @@ def test_without_tilts_the_mirror_of_a_scale_line_is_known_as_well_as_it_is_alig
     # D^2 - D l - l^2/2 of both directions, where the mirror is 500 urad off the beam, and the laser off the axis: 95 %
     # of it is below 1.509 um/m (tests/cpp/adjustment/setup_priors_test.cpp). Else D is 0.
     for mirror, square in ((None, 1.509e-6 / FACTOR), ("fixed", beyond_tilt(0.0, 500e-6))):
-        adjustment = adjusted(run, plan, setup_by_line={"p00": sd.SetupPriors(reflector=mirror)})
+        adjustment = adjusted(run, plan, setup_by_line={"p00": sd.methods.SetupPriors(reflector=mirror)})
         unknowns = {s.quantity for s in adjustment.setup if s.line == "p00"}
         assert unknowns & {"reflector", "laser", "roll", "gain"} == ({"reflector"} if mirror is None else set())
         _, u = scale_of(adjustment, 1, "X")
@@ -126,7 +126,7 @@ def test_beams_of_unknown_constants_leave_the_mirror_of_a_scale_line_to_its_prio
     head = HEADS["multi_beam"][0]
     plan = sd.Plan(VOLUME, DIAGONALS, STEPS, scale_lines=["p00"], scale_points="steps")
     run = sd.simulate(sd.Machine(CHAIN), plan, head)
-    for told, prior in ((sd.SetupPriors(), 500e-6), (sd.SetupPriors(reflector=300e-6), 300e-6)):
+    for told, prior in ((sd.methods.SetupPriors(), 500e-6), (sd.methods.SetupPriors(reflector=300e-6), 300e-6)):
         found = adjusted(run, plan, head, setup_by_line={"p00": told})
         mirror = [s for s in found.setup if (s.line, s.quantity) == ("p00", "reflector")]
         assert [s.prior for s in mirror] == [prior, prior]
@@ -163,7 +163,7 @@ def drifting(pace: float) -> Draw:
 
 
 def angles_known_to(size: float) -> dict[str, Any]:
-    return {"setup": sd.SetupPriors(laser=size, reflector=size)}
+    return {"setup": sd.methods.SetupPriors(laser=size, reflector=size)}
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def angles_known_to(size: float) -> dict[str, Any]:
         (SIX_FACES, faces_out_of_true(3e-3), angles_known_to(3e-3), None),
         (SIX_FACES, faces_out_of_true(3e-3), {}, None),
         (STANDARD, drifting(5.0), {}, 3.0),
-        (STANDARD, drifting(20.0), {"setup": sd.SetupPriors(drift=20.0 * PER_HOUR)}, 3.0),
+        (STANDARD, drifting(20.0), {"setup": sd.methods.SetupPriors(drift=20.0 * PER_HOUR)}, 3.0),
     ],
     ids=["scale lasers", "faces 2 mrad", "faces 3 mrad", "faces 3 mrad, not told", "drift 5", "drift 20, told"],
 )
@@ -216,9 +216,11 @@ def test_ends_of_scale_lines_are_covered_by_the_angles_of_their_priors(
     beams of unknown constants. Rotations are small, so that priors of lateral offsets have no part in it."""
     head, steps = HEADS[layout][0], 4
     plan = sd.Plan(VOLUME, DIAGONALS, steps, scale_lines=["p00"], scale_points=scale_points)
-    uncertainty = sd.ReadingUncertainty(distance=1e-5, tilt=1e-6, spot=1e-3)
-    known = sd.SetupPriors(laser=laser, reflector=mirror if layout == "multi_beam" else None)
-    aligned = sd.SetupPriors(laser=100e-6)  # the measured lines; beams of unknown constants find their lasers slowly
+    uncertainty = sd.methods.ReadingUncertainty(distance=1e-5, tilt=1e-6, spot=1e-3)
+    known = sd.methods.SetupPriors(laser=laser, reflector=mirror if layout == "multi_beam" else None)
+    aligned = sd.methods.SetupPriors(
+        laser=100e-6
+    )  # the measured lines; beams of unknown constants find their lasers slowly
     covered, runs = 0, 400
     for seed in range(runs):
         rng = np.random.default_rng([18, seed])
@@ -227,7 +229,7 @@ def test_ends_of_scale_lines_are_covered_by_the_angles_of_their_priors(
         machine = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=seed, intervals=steps, rotation=5e-6))
         noise = sd.Noise(distance=1e-5, tilt=1e-6, spot=1e-3, seed=seed)
         run = sd.simulate(machine, plan, head, misalignment=angles, noise=noise)
-        found = sd.adjust(
+        found = sd.methods.adjust(
             run,
             plan,
             head,
@@ -259,7 +261,7 @@ def test_drift_has_a_prior_where_every_reading_of_a_line_has_a_time() -> None:
 def test_drift_that_is_there_is_in_the_uncertainty_of_squarenesses() -> None:
     """A body diagonal sees a squareness by A B/length; each drifts by itself, over its own duration."""
     timed = run_of(4, STANDARD, {}, seconds_per_reading=30.0)
-    plain = adjusted(timed, STANDARD, setup=sd.SetupPriors(drift="fixed")).calibration.squareness
+    plain = adjusted(timed, STANDARD, setup=sd.methods.SetupPriors(drift="fixed")).calibration.squareness
     known = adjusted(timed, STANDARD).calibration.squareness
     length, duration = float(np.linalg.norm(VOLUME)), 30.0 * 3 * STEPS
     for name, (a, b) in {"C0Y": (0, 1), "B0Z": (0, 2), "A0Z": (1, 2)}.items():
@@ -280,7 +282,7 @@ def test_angles_of_faces_are_taken_for_what_their_tilts_show_where_that_is_more_
         return max(u for _, u in found.calibration.squareness.values())
 
     # Mirror and laser are twice `size` apart in both directions, as two angles of sqrt(2) `size` are.
-    stated = sd.SetupPriors(laser=2e-3, reflector=2e-3)
+    stated = sd.methods.SetupPriors(laser=2e-3, reflector=2e-3)
     aligned, small, large = 1e-4, 1.2e-3, 6e-3 / np.sqrt(2)
     # Below 2 mrad both know the same, but for the first order, which a stated prior divides otherwise.
     known = largest(aligned, setup=stated)
@@ -291,7 +293,7 @@ def test_angles_of_faces_are_taken_for_what_their_tilts_show_where_that_is_more_
     assert largest(large, setup=stated) < 0.5 * largest(large)
 
 
-def drifting_alike(pace: float, seed: int, **told: Any) -> sd.Verdict:
+def drifting_alike(pace: float, seed: int, **told: Any) -> sd.results.Verdict:
     """The verdict on a run of which all distances drift, um/h, with set-ups as they are."""
     rng = np.random.default_rng([17, seed])
     lines = {
@@ -313,7 +315,7 @@ def test_drift_that_its_prior_does_not_explain_is_a_reason() -> None:
     # The readings see the sum of the four diagonals alone, and drifts that are independent make such a sum where they
     # are twice as large.
     assert reason.value == pytest.approx(2.0 * 23.0 * PER_HOUR, rel=0.25)
-    told = drifting_alike(23.0, 3, setup=sd.SetupPriors(drift=23.0 * PER_HOUR))
+    told = drifting_alike(23.0, 3, setup=sd.methods.SetupPriors(drift=23.0 * PER_HOUR))
     assert (told.fit, told.reasons) == ("accepted", [])
 
 

@@ -58,7 +58,7 @@ def test_cross_validation_finds_smooth_axes_and_keeps_the_screw() -> None:
     scenario, table, pitch = smooth_machine(72, 60, screw)
     run = noisy(measured(reference.simulate(scenario, table)), np.random.default_rng(72))
     rough = adjust(run, scenario, outlier_probability=0.0)
-    smooth = adjust(run, scenario, outlier_probability=0.0, smoothness=sd.Smoothness(cross_validated=True))
+    smooth = adjust(run, scenario, outlier_probability=0.0, smoothness=sd.methods.Smoothness(cross_validated=True))
     assert set(smooth.smoothness) <= set(FUNCTIONS)
     position, value, _ = smooth.calibration.functions["EXX"]
     # What is left of the pitch error, by least squares beside a polynomial for the long waves.
@@ -77,7 +77,7 @@ def test_cross_validation_claims_no_more_than_it_knows() -> None:
     for seed in range(6):
         scenario, table, _ = smooth_machine(80 + seed, 30, 0.0)
         run = noisy(measured(reference.simulate(scenario, table)), np.random.default_rng(seed))
-        smooth = adjust(run, scenario, outlier_probability=0.0, smoothness=sd.Smoothness(cross_validated=True))
+        smooth = adjust(run, scenario, outlier_probability=0.0, smoothness=sd.methods.Smoothness(cross_validated=True))
         for name, (_, value, u) in smooth.calibration.functions.items():
             error = value - np.array(table.functions[name][1])
             ratios.append(error[u > 0] / u[u > 0])

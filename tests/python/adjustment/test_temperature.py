@@ -27,8 +27,8 @@ def random_scales(rng: np.random.Generator, *, warms_up: bool) -> reference.Scal
     return reference.Scales(GLASS_AND_STEEL, three[0], rate, three[2])
 
 
-def known(scales: reference.Scales, *, u: float = 1e-6, sensor: float = 0.1, **more: Any) -> sd.KnownExpansion:
-    return sd.KnownExpansion(
+def known(scales: reference.Scales, *, u: float = 1e-6, sensor: float = 0.1, **more: Any) -> sd.methods.KnownExpansion:
+    return sd.methods.KnownExpansion(
         expansion_of(scales), (u, u, u), sensor_uncertainty=sensor, **({"one_coefficient": False} | more)
     )
 

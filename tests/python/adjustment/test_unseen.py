@@ -24,8 +24,8 @@ PLANS = {
 
 def adjusted(text: str, *, reliability: bool = False) -> tuple[sd.Adjustment, sd.Measurement]:
     scenario = sd.parse_scenario(text)
-    run = sd.simulate_scenario(scenario)
-    return sd.adjust_scenario(scenario, run, reliability=reliability), run
+    run = sd.simulate(scenario)
+    return sd.methods.adjust_scenario(scenario, run, reliability=reliability), run
 
 
 @pytest.mark.parametrize("plan", PLANS)
@@ -51,7 +51,7 @@ def test_a_wrong_end_of_a_scale_line_that_stays_unseen_does_what_is_said() -> No
     end = max(row for row, line in enumerate(run.line) if line == "p00")
     channels["distance"][end] += 0.2 * said.size
     wrong = sd.Measurement(run.line, run.point, run.position, channels, run=run.run, direction=run.direction)
-    found = sd.adjust_scenario(sd.parse_scenario(SOUND.replace("steps = 5", "steps = 20")), wrong)
+    found = sd.methods.adjust_scenario(sd.parse_scenario(SOUND.replace("steps = 5", "steps = 20")), wrong)
     assert (found.verdict.fit, found.faults) == ("accepted", [])
     change = {
         name: np.max(np.abs(found.calibration.functions[name][1] - value))

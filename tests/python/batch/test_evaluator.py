@@ -27,9 +27,11 @@ class Case:
         self.table = random_table(self.rng, self.scenario.volume, steps)
         self.pattern = measured(reference.simulate(self.scenario, self.table))
 
-    def evaluator(self, method: str = "adjustment", **options: Any) -> sd.BatchEvaluator:
+    def evaluator(self, method: str = "adjustment", **options: Any) -> sd.montecarlo.BatchEvaluator:
         s = self.scenario
-        return sd.BatchEvaluator(self.pattern, plan_of(s), head_of(s), s.chain, s.tool, method=method, **options)
+        return sd.montecarlo.BatchEvaluator(
+            self.pattern, plan_of(s), head_of(s), s.chain, s.tool, method=method, **options
+        )
 
     def sample(self, size: float = 1e-3) -> sd.Measurement:
         for line in self.scenario.lines:
@@ -74,7 +76,7 @@ def test_each_set_is_evaluated_as_if_it_were_alone(method: str) -> None:
     evaluator = case.evaluator(method)
     run = case.sample(1e-4)
     s = case.scenario
-    expected, u = tables(sd.evaluate(run, plan_of(s), head_of(s), sd.Chain(s.chain), s.tool, method=method))
+    expected, u = tables(sd.methods.evaluate(run, plan_of(s), head_of(s), sd.Chain(s.chain), s.tool, method=method))
     found = evaluator.evaluate([readings(run)])[0]
     # Readings are weighed as those of the pattern, whose tilts are others: 7e-4 at 1e-4 rad, 7e-5 at 1e-5.
     assert np.all(np.abs(found - expected) <= 1e-3 * u)
@@ -190,4 +192,4 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(sd.InvalidArgument, match='method: expected "conventional"'):
         case.evaluator("exact")
     with pytest.raises(sd.InvalidArgument, match="ppp0"):
-        case.evaluator(setup_by_line={"ppp0": sd.SetupPriors(laser="fixed")})
+        case.evaluator(setup_by_line={"ppp0": sd.methods.SetupPriors(laser="fixed")})

@@ -20,14 +20,14 @@ def without(run: sd.Measurement, lost: list[bool]) -> sd.Measurement:
 
 
 def test_every_reason_and_remedy_has_its_words() -> None:
-    assert list(finding_text.REASONS) == sd.Undetermined.reasons()
-    assert list(finding_text.REMEDIES) == sd.Undetermined.all_remedies()
+    assert list(finding_text.REASONS) == sd.results.Undetermined.reasons()
+    assert list(finding_text.REMEDIES) == sd.results.Undetermined.all_remedies()
 
 
 @pytest.mark.parametrize(("method", "remedy"), [("adjustment", "axis_line"), ("enhanced", "scale_line")])
 def test_open_scales_are_records_with_the_line_that_helps(method: str, remedy: str) -> None:
     run = simulate(1, plan=NO_SCALE_LINES)
-    calibration = sd.evaluate(run, NO_SCALE_LINES, sd.Head(), CHAIN, TOOL, method=method)
+    calibration = sd.methods.evaluate(run, NO_SCALE_LINES, sd.Head(), CHAIN, TOOL, method=method)
     found = [(f.part, f.parameters, f.reason, f.remedies, f.line) for f in calibration.findings if f.part == "slope"]
     assert found == [
         ("slope", ["EXX"], "not_seen", [remedy], "p00"),
@@ -42,7 +42,7 @@ def test_a_step_that_was_read_on_too_few_lines_is_said_with_its_place() -> None:
     three = sd.Plan(VOLUME, DIAGONALS[:3], 5, scale_lines=PLAN.scale_lines)
     run = simulate(1, plan=three)
     lost = [(line, point) == ("npp", 4) for line, point in zip(run.line, run.point, strict=True)]
-    calibration = sd.evaluate(without(run, lost), three, sd.Head(), CHAIN, TOOL, method="conventional")
+    calibration = sd.methods.evaluate(without(run, lost), three, sd.Head(), CHAIN, TOOL, method="conventional")
     finding = next(f for f in calibration.findings if f.step)
     assert (finding.part, finding.reason, finding.remedies) == ("whole", "few_diagonals", ["lost_points"])
     # The second step of npp, which comes from the end of X.
@@ -57,13 +57,13 @@ def test_a_step_that_was_read_on_too_few_lines_is_said_with_its_place() -> None:
 def test_what_nothing_determines_is_refused_in_the_words_of_its_first_finding() -> None:
     run = simulate(1)
     with pytest.raises(sd.InvalidArgument) as refusal:
-        sd.evaluate(without(run, list(run.point % 3 != 0)), PLAN, sd.Head(), CHAIN, TOOL, method="conventional")
+        sd.methods.evaluate(without(run, list(run.point % 3 != 0)), PLAN, sd.Head(), CHAIN, TOOL, method="conventional")
     assert "conventional evaluation: nothing can be determined. EXX" in str(refusal.value)
     assert "measure the lost points again" in str(refusal.value)
 
 
 def test_the_mean_of_open_scales_is_known_to_its_uncertainty() -> None:
-    found = sd.adjust(simulate(1, plan=NO_SCALE_LINES), NO_SCALE_LINES, sd.Head(), CHAIN, TOOL)
+    found = sd.methods.adjust(simulate(1, plan=NO_SCALE_LINES), NO_SCALE_LINES, sd.Head(), CHAIN, TOOL)
     mean = found.combinations[-1]
     errors = sd.random_error_map(VOLUME, seed=3, intervals=5)
     edges = dict(zip(("EXX", "EYY", "EZZ"), VOLUME, strict=True))
@@ -78,7 +78,7 @@ def test_the_mean_of_open_scales_is_known_to_its_uncertainty() -> None:
 
 
 def test_files_keep_findings_in_words(tmp_path: Path) -> None:
-    calibration = sd.evaluate(simulate(1, plan=NO_SCALE_LINES), NO_SCALE_LINES, sd.Head(), CHAIN, TOOL)
+    calibration = sd.methods.evaluate(simulate(1, plan=NO_SCALE_LINES), NO_SCALE_LINES, sd.Head(), CHAIN, TOOL)
     calibration.write(tmp_path / "open.csv")
     again = sd.read_calibration(tmp_path / "open.csv")
     assert again.undetermined == calibration.undetermined

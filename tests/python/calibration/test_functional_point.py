@@ -33,7 +33,7 @@ def along(axis: str, position: Any) -> Any:
 def test_is_what_the_exact_machine_does_moved_along_one_axis(chain: str, tool: tuple[float, float, float]) -> None:
     calibration = random_calibration(chain, tool)
     machine = sd.Machine(chain, calibration.to_error_map(), tool)
-    straightness = sd.functional_point_straightness(calibration)
+    straightness = sd.methods.functional_point_straightness(calibration)
     for axis in "XYZ":
         for i, component in enumerate("XYZ"):
             if component == axis:
@@ -50,29 +50,31 @@ def test_57_micrometres_at_71_microradians_and_800_millimetres() -> None:
     ends = np.array([0.0, 800.0])
     functions = {"EYX": (ends, zero, zero), "EZX": (ends, zero, zero), "EBX": (ends, zero, zero)}
     functions["ECX"] = (ends, np.array([0.0, 71e-6]), zero)
-    found = sd.functional_point_straightness(sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions))
+    found = sd.methods.functional_point_straightness(sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions))
     assert found["EYX"][1].tolist() == [0.0, pytest.approx(0.0568)]
     assert found["EZX"][1].tolist() == [0.0, 0.0]
 
 
 def test_only_what_differs_and_is_determined_is_there() -> None:
-    assert sd.functional_point_straightness(random_calibration("[w b X Y Z t]", (0, 0, 0))) == {}
-    assert sd.functional_point_straightness(random_calibration(CHAIN, (0, 0, 0))).keys() == {"EYX", "EZX"}
-    with_tool = sd.functional_point_straightness(random_calibration(CHAIN, (0, 0, 100.0)))
+    assert sd.methods.functional_point_straightness(random_calibration("[w b X Y Z t]", (0, 0, 0))) == {}
+    assert sd.methods.functional_point_straightness(random_calibration(CHAIN, (0, 0, 0))).keys() == {"EYX", "EZX"}
+    with_tool = sd.methods.functional_point_straightness(random_calibration(CHAIN, (0, 0, 100.0)))
     # EZY + EAY t_y - EBY t_x: an offset along Z is no arm.
     assert with_tool.keys() == {"EYX", "EZX", "EXY", "EXZ", "EYZ"}
     functions = random_calibration(CHAIN, (0, 0, 0)).functions
     del functions["ECX"]
-    assert sd.functional_point_straightness(sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions)).keys() == {"EZX"}
+    assert sd.methods.functional_point_straightness(sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions)).keys() == {
+        "EZX"
+    }
     open_slope = sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions, undetermined_slopes=["EBX"])
-    assert sd.functional_point_straightness(open_slope) == {}
+    assert sd.methods.functional_point_straightness(open_slope) == {}
 
 
 def test_uncertainty_counts_the_covariance_of_straightness_and_rotation() -> None:
     calibration = calibrate(1, full_covariance=True)
     covariance, labels = calibration.covariance, calibration.covariance_labels
     assert covariance is not None
-    position, _, uncertainty = sd.functional_point_straightness(calibration)["EYX"]
+    position, _, uncertainty = sd.methods.functional_point_straightness(calibration)["EYX"]
     for k, p in enumerate(position):
         rows = np.array([labels.index((name, p)) for name in ("EYX", "ECX", "EAX")])
         factor = np.array([1.0, p + calibration.tool[0], -calibration.tool[2]])  # of theta x L along Y
@@ -83,7 +85,7 @@ def test_uncertainty_counts_the_covariance_of_straightness_and_rotation() -> Non
 
 def test_without_a_covariance_straightness_and_rotation_are_taken_as_independent() -> None:
     calibration = random_calibration(CHAIN, (0, 0, 0))
-    position, _, uncertainty = sd.functional_point_straightness(calibration)["EYX"]
+    position, _, uncertainty = sd.methods.functional_point_straightness(calibration)["EYX"]
     np.testing.assert_allclose(uncertainty, 1e-5 * np.hypot(1.0, position), rtol=1e-14)
 
 
@@ -92,7 +94,7 @@ def test_nodes_of_rotations_are_interpolated() -> None:
         "EYX": ([0.0, 300.0, 800.0], [0.0, 0.01, 0.0], [0.0, 1e-4, 0.0]),
         "ECX": ([0.0, 400.0], [0.0, 40e-6], [0.0, np.nan]),
     }
-    found = sd.functional_point_straightness(sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions))["EYX"]
+    found = sd.methods.functional_point_straightness(sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), functions))["EYX"]
     assert found[1].tolist() == [0.0, pytest.approx(0.01 + 300 * 30e-6), pytest.approx(800 * 40e-6)]
     assert np.isnan(found[2]).tolist() == [False, True, True]
 
@@ -123,8 +125,8 @@ def test_report_tells_the_reference_and_exports_the_functional_point(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     calibration = calibrate(1, full_covariance=True)
-    sd.write_calibration(calibration, "calibration.nc")
-    sd.write_calibration(calibration, "calibration.csv")
+    calibration.write("calibration.nc")
+    calibration.write("calibration.csv")
     assert main(["report", "calibration.nc", "--functional-point", "point.csv"]) == 0
     said = capsys.readouterr().out
     assert f"reference: {calibration.straightness_reference}" in said
@@ -133,7 +135,7 @@ def test_report_tells_the_reference_and_exports_the_functional_point(
     assert "squareness" in said
     rows = [line.split(",") for line in Path("point.csv").read_text().splitlines() if not line.startswith("#")]
     assert rows[0] == ["parameter", "position_mm", "table", "functional_point", "unit", "standard_uncertainty"]
-    for name, (position, value, uncertainty) in sd.functional_point_straightness(calibration).items():
+    for name, (position, value, uncertainty) in sd.methods.functional_point_straightness(calibration).items():
         table = np.array([[float(field) for field in (*row[1:4], row[5])] for row in rows if row[0] == name])
         expected = np.column_stack([position, calibration.functions[name][1] * 1e3, value * 1e3, uncertainty * 1e3])
         np.testing.assert_allclose(table, expected, rtol=1e-15)
@@ -144,7 +146,7 @@ def test_report_tells_the_reference_and_exports_the_functional_point(
 
 def test_functional_point_is_no_error_map(tmp_path: Path) -> None:
     """Its values are not the tables': nobody may load them as those."""
-    sd.write_calibration(calibrate(1), tmp_path / "calibration.csv")
+    calibrate(1).write(tmp_path / "calibration.csv")
     assert main(["report", str(tmp_path / "calibration.csv"), "--functional-point", str(tmp_path / "point.csv")]) == 0
     for reader in (sd.read_error_map, sd.read_calibration):
         with pytest.raises(sd.InvalidArgument, match=r"point\.csv"):
@@ -153,7 +155,7 @@ def test_functional_point_is_no_error_map(tmp_path: Path) -> None:
 
 def test_report_of_a_calibration_that_knows_little(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     little = sd.Calibration("", CHAIN, VOLUME, (0, 0, 0), {"EXX": ([0.0, 800.0], [0.0, 0.01], [np.nan, np.nan])})
-    sd.write_calibration(little, tmp_path / "little.nc")
+    little.write(tmp_path / "little.nc")
     assert main(["report", str(tmp_path / "little.nc")]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "fit: not known"
@@ -177,7 +179,7 @@ def test_report_tells_shapes_from_errors_and_what_reversal_there_is(
         undetermined_slopes=["EXX"],
         reversal={"EYX": (nodes, [0.0, -0.004, 0.001], u)},
     )
-    sd.write_calibration(calibration, tmp_path / "calibration.csv")
+    calibration.write(tmp_path / "calibration.csv")
     assert main(["report", str(tmp_path / "calibration.csv")]) == 0
     said = capsys.readouterr().out
     assert "(EXX's shape at 400 mm)" in said
@@ -187,7 +189,7 @@ def test_report_tells_shapes_from_errors_and_what_reversal_there_is(
 
 
 def test_report_refuses_to_write_over_its_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sd.write_calibration(calibrate(1), tmp_path / "calibration.csv")
+    calibrate(1).write(tmp_path / "calibration.csv")
     path = str(tmp_path / "calibration.csv")
     assert main(["report", path, "--functional-point", path]) == 2
     assert "is also an input" in capsys.readouterr().err

@@ -12,7 +12,7 @@ import stepdiag as sd
 
 def test_calibration_is_made_again_from_its_parts() -> None:
     run = simulate(1, backward=True)
-    adjusted = sd.adjust(run, PLAN, sd.Head(), "[w X' b Y Z t]", full_covariance=True).calibration
+    adjusted = sd.methods.adjust(run, PLAN, sd.Head(), "[w X' b Y Z t]", full_covariance=True).calibration
     assert adjusted.reversal
     for calibration in (adjusted, calibrate(1), calibrate(1, method="enhanced", full_covariance=True)):
         assert same_calibration(sd.Calibration(**parts_of(calibration)), calibration)

@@ -58,12 +58,12 @@ def test_figures_have_fewer_words() -> None:
 
 def test_comparison_of_different_temperatures_says_so() -> None:
     one, other = calibration(temperature_reference=20.0), calibration(temperature_as_found=(23.0, 23.0, 23.0))
-    notes = sd.compare_calibrations(one, other).notes
+    notes = sd.compare(one, other).notes
     assert (
         "temperatures differ: A referred to 20 °C, B as found at 23.0 °C; so positioning differs by the scales' "
         in ("\n".join(notes))
     )
-    assert not any("temperature" in note for note in sd.compare_calibrations(one, one).notes)
+    assert not any("temperature" in note for note in sd.compare(one, one).notes)
 
 
 def test_the_size_at_stake_is_that_of_steel() -> None:
@@ -88,9 +88,9 @@ def test_a_part_shrinks_to_what_it_measures_at_20_degrees() -> None:
 @pytest.mark.parametrize("ending", ["csv", "nc"])
 def test_files_keep_the_temperature(ending: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / f"calibration.{ending}"
-    sd.write_calibration(calibration(temperature_reference=20.0), path)
+    calibration(temperature_reference=20.0).write(path)
     assert sd.read_calibration(path).temperature_reference == 20.0
-    sd.write_calibration(calibration(temperature_as_found=(23.1, 23.0, 22.8)), path)
+    calibration(temperature_as_found=(23.1, 23.0, 22.8)).write(path)
     assert sd.read_calibration(path).temperature_as_found.tolist() == [23.1, 23.0, 22.8]
     assert sd.read_calibration(path).temperature_reference is None
     assert sd.read_calibration(path).expansion is None
@@ -100,7 +100,7 @@ def test_files_keep_the_temperature(ending: str, tmp_path) -> None:  # type: ign
 def test_files_keep_the_expansion_to_the_last_bit(ending: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / f"calibration.{ending}"
     expansion, fixed_point = (1.15e-5, 0.1 / 3.0 * 1e-4, -5e-8), (0.0, -40.5, 1e3 / 3.0)
-    sd.write_calibration(calibration(temperature_reference=20.0, expansion=expansion, fixed_point=fixed_point), path)
+    calibration(temperature_reference=20.0, expansion=expansion, fixed_point=fixed_point).write(path)
     read = sd.read_calibration(path)
     assert tuple(read.expansion) == expansion
     assert tuple(read.fixed_point) == fixed_point

@@ -26,7 +26,7 @@ def test_probability_of_chi_square_is_the_incomplete_gamma_function(freedom: int
 def test_deviations_are_the_truth_less_the_calibration_at_its_nodes() -> None:
     calibration = calibrate(1)
     for a, b, sign in ((calibration, TRUTH, 1.0), (TRUTH, calibration, -1.0)):
-        comparison = sd.compare_calibrations(a, b)
+        comparison = sd.compare(a, b)
         for difference in comparison.differences:
             name = difference.parameter
             if name in calibration.functions:
@@ -48,12 +48,12 @@ def test_deviations_are_the_truth_less_the_calibration_at_its_nodes() -> None:
 
 
 def test_two_calibrations_have_no_agreement() -> None:
-    assert sd.compare_calibrations(calibrate(1), calibrate(2)).agreement is None
+    assert sd.compare(calibrate(1), calibrate(2)).agreement is None
 
 
 @pytest.fixture(scope="module")
-def agreements() -> list[sd.TruthAgreement]:
-    found = [sd.compare_calibrations(calibrate(seed, full_covariance=True), TRUTH).agreement for seed in range(60)]
+def agreements() -> list[sd.results.TruthAgreement]:
+    found = [sd.compare(calibrate(seed, full_covariance=True), TRUTH).agreement for seed in range(60)]
     return [agreement for agreement in found if agreement is not None]
 
 
@@ -70,7 +70,7 @@ def test_chi_square_of_truths_drawn_with_the_covariance_is_that_of_its_freedom()
             {name: (p, value + noise[names == name]) for name, (p, value, _) in calibration.functions.items()},
             {name: value + float(noise[names == name][0]) for name, (value, _) in calibration.squareness.items()},
         )
-        agreement = sd.compare_calibrations(calibration, drawn).agreement
+        agreement = sd.compare(calibration, drawn).agreement
         assert agreement is not None
         # 18 functions of 5 nodes beside home, of which 6 straightnesses are 0 at the end, and 3 squarenesses.
         assert agreement.degrees_of_freedom == 18 * 5 - 6 + 3
@@ -81,13 +81,15 @@ def test_chi_square_of_truths_drawn_with_the_covariance_is_that_of_its_freedom()
     assert np.var(sums, ddof=1) == pytest.approx(2.0 * 87.0, rel=4.0 * math.sqrt(2.0 / 199.0))
 
 
-def test_chi_square_of_calibrations_of_a_known_machine_is_at_most_that(agreements: list[sd.TruthAgreement]) -> None:
+def test_chi_square_of_calibrations_of_a_known_machine_is_at_most_that(
+    agreements: list[sd.results.TruthAgreement],
+) -> None:
     """Noise is as stated; what the priors of the set-up allow for is 0 in this simulation, and takes some off."""
     mean = np.mean([agreement.chi_square for agreement in agreements if agreement.chi_square is not None])
     assert 87.0 - 21.0 < mean < 87.0 + 4.0 * math.sqrt(2.0 * 87.0 / 60.0)  # 7 lines of 3 angles that have priors
 
 
-def test_one_value_in_twenty_is_beyond_two_u(agreements: list[sd.TruthAgreement]) -> None:
+def test_one_value_in_twenty_is_beyond_two_u(agreements: list[sd.results.TruthAgreement]) -> None:
     share = np.mean([agreement.beyond_two / agreement.values for agreement in agreements])
     # 4.55 %. Correlated neighbours make less of 60 times 87 values: 1.5 % allows for a tenth of them.
     assert share == pytest.approx(0.0455, abs=0.015)
@@ -97,8 +99,8 @@ def test_one_value_in_twenty_is_beyond_two_u(agreements: list[sd.TruthAgreement]
 def test_chi_square_sees_an_uncertainty_that_is_too_small() -> None:
     calibration = calibrate(1, full_covariance=True)
     assert calibration.covariance is not None
-    smaller = sd.with_covariance(calibration, calibration.covariance / 4.0)
-    one, other = (sd.compare_calibrations(each, TRUTH).agreement for each in (calibration, smaller))
+    smaller = sd.montecarlo.with_covariance(calibration, calibration.covariance / 4.0)
+    one, other = (sd.compare(each, TRUTH).agreement for each in (calibration, smaller))
     assert one is not None
     assert other is not None
     assert one.chi_square is not None
@@ -113,7 +115,7 @@ def test_shapes_are_compared_where_slopes_are_open() -> None:
     plan = sd.Plan(VOLUME, DIAGONALS, 5)
     calibration = calibrate(4, plan=plan, full_covariance=True)
     assert calibration.undetermined_slopes == ["EXX", "EYY", "EZZ"]
-    agreement = sd.compare_calibrations(calibration, TRUTH).agreement
+    agreement = sd.compare(calibration, TRUTH).agreement
     assert agreement is not None
     assert agreement.probability is not None
     assert 1e-4 < agreement.probability < 1.0 - 1e-4
@@ -121,8 +123,8 @@ def test_shapes_are_compared_where_slopes_are_open() -> None:
 
 def test_reversal_errors_are_compared_too() -> None:
     run = simulate(1, repeats=2, backward=True)
-    calibration = sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
-    comparison = sd.compare_calibrations(calibration, TRUTH)
+    calibration = sd.methods.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
+    comparison = sd.compare(calibration, TRUTH)
     reversal = next(d for d in comparison.differences if d.parameter == "EXX_reversal")
     np.testing.assert_allclose(reversal.value, -calibration.reversal["EXX"][1], atol=1e-18)  # the truth has none
     assert comparison.agreement is not None
@@ -131,7 +133,7 @@ def test_reversal_errors_are_compared_too() -> None:
 
 def test_parameters_that_the_map_lacks_are_0() -> None:
     calibration = calibrate(1)
-    comparison = sd.compare_calibrations(calibration, sd.ErrorMap())
+    comparison = sd.compare(calibration, sd.ErrorMap())
     assert [d.parameter for d in comparison.differences if d.parameter == "EXX"] == ["EXX"]
     (difference,) = (d for d in comparison.differences if d.parameter == "EXX")
     np.testing.assert_array_equal(difference.value, -calibration.functions["EXX"][1])
@@ -140,25 +142,25 @@ def test_parameters_that_the_map_lacks_are_0() -> None:
 
 def test_map_that_breaks_the_frame_is_noted() -> None:
     broken = sd.ErrorMap({"EYX": ([0.0, 80.0], [0.0, 5e-3])})
-    notes = sd.compare_calibrations(calibrate(1), broken).notes
+    notes = sd.compare(calibrate(1), broken).notes
     assert any(note.startswith("error map: EYX is 5 µm at the end of travel") for note in notes)
 
 
 def test_map_of_another_machine_is_refused(tmp_path_factory: pytest.TempPathFactory) -> None:
     file = tmp_path_factory.mktemp("maps") / "map.csv"
     TRUTH.write(file, chain="[w b X Y Z t]")
-    refused(sd.compare_calibrations, calibrate(1), sd.read_error_map(file), names="the chains differ")
+    refused(sd.compare, calibrate(1), sd.read_error_map(file), names="the chains differ")
     TRUTH.write(file, volume=(80.0, 60.0, 51.0))
-    refused(sd.compare_calibrations, calibrate(1), sd.read_error_map(file), names="the volumes differ")
+    refused(sd.compare, calibrate(1), sd.read_error_map(file), names="the volumes differ")
     file.write_text(f"# volume_mm=large\n{file.read_text()}")
-    refused(sd.compare_calibrations, TRUTH, TRUTH, names="expected one calibration at least, got two error maps")
+    refused(sd.compare, TRUTH, TRUTH, names="expected one calibration at least, got two error maps")
 
 
 def test_uncertainties_that_are_not_known_leave_the_agreement_open() -> None:
     parts = parts_of(calibrate(1))
     parts["functions"] = {n: (p, v, np.full(len(p), np.nan)) for n, (p, v, _) in parts["functions"].items()}
     parts["squareness"] = {name: (value, math.nan) for name, (value, _) in parts["squareness"].items()}
-    agreement = sd.compare_calibrations(sd.Calibration(**parts), TRUTH).agreement
+    agreement = sd.compare(sd.Calibration(**parts), TRUTH).agreement
     assert agreement is not None
     assert (agreement.values, agreement.beyond_two) == (0, 0)
     assert math.isnan(agreement.rms)

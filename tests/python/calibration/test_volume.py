@@ -13,7 +13,7 @@ from usual import ALL_CHAINS, CHAIN
 import stepdiag as sd
 from stepdiag import _core
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
-from stepdiag.report.volume import volume_report
+from stepdiag.presentation.volume import volume_report
 
 # Both evaluate one pose; what is left is rounding of positions of up to 1 m.
 EXACT = 1e-9
@@ -23,7 +23,7 @@ def machine(chain: str = CHAIN, seed: int = 3, tool: npt.ArrayLike = (10.0, -20.
     return sd.Machine(chain, sd.random_error_map(VOLUME, seed=seed, intervals=7), tool)
 
 
-def all_points(found: sd.VolumeErrors) -> npt.NDArray[np.float64]:
+def all_points(found: sd.results.VolumeErrors) -> npt.NDArray[np.float64]:
     return np.stack(np.meshgrid(*found.grid, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
@@ -39,7 +39,7 @@ def without(errors: sd.ErrorMap, names: tuple[str, ...]) -> sd.ErrorMap:
 @pytest.mark.parametrize("chain", ALL_CHAINS)
 def test_largest_error_and_ranges_are_those_of_all_grid_points(chain: str) -> None:
     tool = machine(chain)
-    found = sd.volume_errors(tool, box=whole())
+    found = sd.volume(tool, box=whole())
     points = all_points(found)
     errors = tool.error(points)
     size = np.linalg.norm(errors, axis=1)
@@ -49,7 +49,7 @@ def test_largest_error_and_ranges_are_those_of_all_grid_points(chain: str) -> No
     np.testing.assert_allclose(found.largest_components, errors[there], atol=EXACT)
     for k, axis in enumerate("XYZ"):
         assert found.ranges[axis].value == pytest.approx(np.ptp(errors[:, k]), abs=EXACT)
-    tilts = sd.errors_at_points(tool, points).tilt
+    tilts = sd.errors_at(tool, points).tilt
     for k, axis in enumerate("ABC"):
         # Tilts are below 1 mrad; both are computed from the same matrices.
         assert found.tilts[axis].value == pytest.approx(np.abs(tilts[:, k]).max(), abs=1e-15)
@@ -58,7 +58,7 @@ def test_largest_error_and_ranges_are_those_of_all_grid_points(chain: str) -> No
 
 def test_rms_is_the_mean_over_the_box_whatever_the_nodes() -> None:
     box = [[1.0, 2.0, 3.0], [70.0, 50.0, 44.0]]
-    found = sd.volume_errors(machine(), box=box, grid=60)
+    found = sd.volume(machine(), box=box, grid=60)
     middles = [np.linspace(low, high, 121)[1::2] for low, high in zip(*box, strict=True)]
     points = np.stack(np.meshgrid(*middles, indexing="ij"), axis=-1).reshape(-1, 3)
     mean = np.mean(np.sum(machine().error(points) ** 2, axis=1))
@@ -70,7 +70,7 @@ def test_rms_is_the_mean_over_the_box_whatever_the_nodes() -> None:
 def test_tilts_are_rotation_vectors_of_the_exact_pose() -> None:
     points = np.random.default_rng(1).uniform(0.0, 50.0, (200, 3))
     rotation, _ = machine().pose(points)
-    found = sd.errors_at_points(machine(), points)
+    found = sd.errors_at(machine(), points)
     for vector, matrix in zip(found.tilt, rotation, strict=True):
         angle = float(np.linalg.norm(vector))
         cross = np.cross(np.eye(3), vector / angle)
@@ -80,15 +80,15 @@ def test_tilts_are_rotation_vectors_of_the_exact_pose() -> None:
 
 def test_errors_at_points_are_those_of_the_machine_also_outside_of_the_tables() -> None:
     points = np.random.default_rng(1).uniform(-20.0, 120.0, (1000, 3))
-    np.testing.assert_allclose(sd.errors_at_points(machine(), points).error, machine().error(points), atol=EXACT)
+    np.testing.assert_allclose(sd.errors_at(machine(), points).error, machine().error(points), atol=EXACT)
 
 
 def test_uncertainties_at_points_are_those_of_error_at_point() -> None:
     calibration = calibrate(1, full_covariance=True)
     points = np.random.default_rng(1).uniform(0.0, 50.0, (20, 3))
-    found = sd.errors_at_points(calibration, points, tool=(5.0, 6.0, 7.0))
+    found = sd.errors_at(calibration, points, tool=(5.0, 6.0, 7.0))
     for k, point in enumerate(points):
-        expected = sd.error_at_point(calibration, point, tool=(5.0, 6.0, 7.0)).standard_uncertainty
+        expected = sd._core.error_at_point(calibration, point, tool=(5.0, 6.0, 7.0)).standard_uncertainty
         assert found.error_uncertainty is not None
         assert found.tilt_uncertainty is not None
         # Sums of the same products in another order.
@@ -98,7 +98,7 @@ def test_uncertainties_at_points_are_those_of_error_at_point() -> None:
 
 def test_ranking_sets_parameters_and_axes_to_zero() -> None:
     tool = machine()
-    found = sd.volume_errors(tool, box=whole())
+    found = sd.volume(tool, box=whole())
     points = all_points(found)
     names = [contribution.name for contribution in found.ranking]
     assert sorted(names) == sorted([*FUNCTIONS, *SQUARENESSES, *"XYZ"])
@@ -114,7 +114,7 @@ def test_ranking_sets_parameters_and_axes_to_zero() -> None:
 
 def test_calibration_gives_its_own_tool_and_volume() -> None:
     calibration = calibrate(1)
-    found = sd.volume_errors(calibration)
+    found = sd.volume(calibration)
     np.testing.assert_array_equal(found.tool, TOOL)
     np.testing.assert_array_equal(found.box, whole())
     own = sd.Machine(calibration.chain, calibration.to_error_map(), TOOL)
@@ -124,14 +124,14 @@ def test_calibration_gives_its_own_tool_and_volume() -> None:
 
 def test_diagonals_are_those_of_the_calibration() -> None:
     calibration = calibrate(1)
-    found = sd.volume_errors(calibration)
-    for name, diagonal in sd.diagonal_errors(calibration).items():
+    found = sd.volume(calibration)
+    for name, diagonal in sd.methods.diagonal_errors(calibration).items():
         # One is exact, the other of first order: they differ by rotations times errors, 1e-4 * 0.05 mm.
         assert found.diagonals[name].value == pytest.approx(diagonal.range, abs=1e-5)
 
 
 def test_other_directions_of_approach_are_those_of_the_machine() -> None:
-    calibration = sd.evaluate(simulate(1, repeats=2, backward=True), PLAN, sd.Head(), CHAIN, TOOL)
+    calibration = sd.methods.evaluate(simulate(1, repeats=2, backward=True), PLAN, sd.Head(), CHAIN, TOOL)
     parts = parts_of(calibration)
     nodes = {name: position for name, (position, _, _) in calibration.functions.items()}
     parts["reversal"] = {
@@ -142,7 +142,7 @@ def test_other_directions_of_approach_are_those_of_the_machine() -> None:
     parts["undetermined_reversal_constants"] = []
     parts["reversal_negative_uncertainty"] = {name: np.full_like(position, 1e-4) for name, position in nodes.items()}
     both = sd.Calibration(**parts)
-    found = sd.volume_errors(both)
+    found = sd.volume(both)
     own = sd.Machine(both.chain, both.to_error_map(), TOOL)
     assert len(found.other_approaches) == 7
     for approach, largest in found.other_approaches.items():
@@ -150,15 +150,15 @@ def test_other_directions_of_approach_are_those_of_the_machine() -> None:
         assert largest == pytest.approx(size.max(), abs=EXACT)
     worst = max(found.other_approaches.values())
     assert any(f"largest error {1e3 * worst:.4g} µm" in row for row in volume_report(found))
-    assert sd.volume_errors(calibrate(1)).other_approaches == {}
+    assert sd.volume(calibrate(1)).other_approaches == {}
     parts["undetermined_reversal_constants"] = ["EXX"]
-    partly = sd.volume_errors(sd.Calibration(**parts))
+    partly = sd.volume(sd.Calibration(**parts))
     assert partly.other_approaches == {}
     assert any("not known, as not all reversal errors are" in row for row in volume_report(partly))
 
 
 def test_box_ends_and_nodes_are_in_the_grid() -> None:
-    found = sd.volume_errors(calibrate(1), box=[[1.0, 2.0, 3.0], [70.0, 50.0, 44.0]], grid=4)
+    found = sd.volume(calibrate(1), box=[[1.0, 2.0, 3.0], [70.0, 50.0, 44.0]], grid=4)
     assert found.grid[0][[0, -1]].tolist() == [1.0, 70.0]
     nodes = calibrate(1).functions["EXX"][0]
     assert set(nodes[(nodes > 1.0) & (nodes < 70.0)].tolist()) <= set(found.grid[0].tolist())
@@ -168,14 +168,14 @@ def test_box_ends_and_nodes_are_in_the_grid() -> None:
 def test_of_very_many_nodes_some_are_computed_and_it_is_said() -> None:
     nodes = np.linspace(0.0, 80.0, 1001)
     many = sd.Machine(CHAIN, sd.ErrorMap({"EXX": (nodes, 1e-4 * nodes)}), TOOL)
-    found = sd.volume_errors(many, box=whole(), ranking=False)
+    found = sd.volume(many, box=whole(), ranking=False)
     assert not found.every_node
     assert found.shape == (201, 2, 2)
     assert set(found.grid[0].tolist()) <= set(nodes.tolist())
     assert found.grid[0][[0, -1]].tolist() == [0.0, 80.0]
     assert found.largest == pytest.approx(8e-3, rel=1e-9)
     assert "the tables have more than 201 nodes an axis: 201 of them, evenly" in list(volume_report(found))
-    few = sd.volume_errors(many, box=[[10, 0, 0], [20, 60, 50]], ranking=False)
+    few = sd.volume(many, box=[[10, 0, 0], [20, 60, 50]], ranking=False)
     assert few.every_node
     assert few.shape[0] == 126
 
@@ -193,15 +193,15 @@ def test_of_very_many_nodes_some_are_computed_and_it_is_said() -> None:
     ],
 )
 def test_what_makes_no_sense_is_refused(arguments: dict[str, Any], message: str) -> None:
-    refused(sd.volume_errors, calibrate(1), **arguments, names=message)
+    refused(sd.volume, calibrate(1), **arguments, names=message)
 
 
 def test_machine_needs_a_box() -> None:
-    refused(sd.volume_errors, machine(), names="box: expected the lowest and highest positions")
+    refused(sd.volume, machine(), names="box: expected the lowest and highest positions")
 
 
 def test_grid_points_are_all_combinations() -> None:
-    points = sd.volume_grid([[0, 0, 0], [1, 2, 3]], (2, 3, 4))
+    points = sd.methods.volume_grid([[0, 0, 0], [1, 2, 3]], (2, 3, 4))
     assert points.shape == (24, 3)
     assert points[-1].tolist() == [1.0, 2.0, 3.0]
     assert points[1].tolist() == [0.0, 0.0, 1.0]
@@ -214,7 +214,7 @@ def certain() -> sd.Calibration:
 
 
 def test_draws_are_the_exact_figures_of_drawn_tables(certain: sd.Calibration) -> None:
-    found = sd.volume_errors(certain, ranking=False)
+    found = sd.volume(certain, ranking=False)
     values = _core.VolumeDraws(certain, *found.grid).values[: len(_core.VolumeDraws.names())]
     figures = [
         found.largest,
@@ -228,14 +228,14 @@ def test_draws_are_the_exact_figures_of_drawn_tables(certain: sd.Calibration) ->
 
 
 def test_draws_do_not_depend_on_how_they_are_divided(certain: sd.Calibration) -> None:
-    grid = sd.volume_errors(certain, ranking=False).grid
+    grid = sd.volume(certain, ranking=False).grid
     draws = _core.VolumeDraws(certain, *grid, seed=3)
     whole = draws.draw(0, 500)
     np.testing.assert_array_equal(np.concatenate([draws.draw(0, 77), draws.draw(77, 423)]), whole)
 
 
 def test_draws_scatter_as_tables_drawn_with_numpy(certain: sd.Calibration) -> None:
-    grid = sd.volume_errors(certain, ranking=False).grid
+    grid = sd.volume(certain, ranking=False).grid
     drawn = _core.VolumeDraws(certain, *grid).draw(0, 4000)[:, :2]
     values, vectors = np.linalg.eigh(certain.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -259,17 +259,17 @@ def test_draws_scatter_as_tables_drawn_with_numpy(certain: sd.Calibration) -> No
 
 
 def test_verdict_follows_the_one_sided_bounds(certain: sd.Calibration) -> None:
-    bounds = sd.volume_errors(certain, ranking=False).bounds
+    bounds = sd.volume(certain, ranking=False).bounds
     assert bounds is not None
     low, high = bounds
     expected = {low * 0.999: "not within", low * 1.001: "undecided", high * 0.999: "undecided", high: "within"}
     for limit, verdict in expected.items():
-        assert sd.volume_errors(certain, ranking=False, limit=limit).verdict == verdict
+        assert sd.volume(certain, ranking=False, limit=limit).verdict == verdict
 
 
 def test_what_lies_between_the_nodes_widens_interval_and_bounds(certain: sd.Calibration) -> None:
-    narrow = sd.volume_errors(certain, ranking=False, between_nodes=0.0)
-    wide = sd.volume_errors(certain, ranking=False, between_nodes=1.0)
+    narrow = sd.volume(certain, ranking=False, between_nodes=0.0)
+    wide = sd.volume(certain, ranking=False, between_nodes=1.0)
     assert narrow.largest_interval is not None
     assert wide.largest_interval is not None
     assert narrow.bounds is not None
@@ -304,7 +304,7 @@ def bounds_of_places(errors: npt.NDArray[np.float64], u: npt.NDArray[np.float64]
             squareness=dict.fromkeys(SQUARENESSES, (0.0, 0.0)),
             covariance=covariance,
         )
-        found = sd.volume_errors(calibration, between_nodes=0.0, ranking=False, samples=1000, seed=seed)
+        found = sd.volume(calibration, between_nodes=0.0, ranking=False, samples=1000, seed=seed)
         assert found.bounds is not None
         bounds.append(found.bounds)
     return np.array(bounds)
@@ -346,11 +346,11 @@ def test_one_place_has_the_bounds_of_a_normal_distribution() -> None:
 
 
 def test_limit_inside_the_interval_of_a_verdict_is_explained(certain: sd.Calibration) -> None:
-    found = sd.volume_errors(certain, ranking=False)
+    found = sd.volume(certain, ranking=False)
     assert found.bounds is not None
     assert found.largest_interval is not None
     limit = 0.5 * (found.bounds[1] + found.largest_interval[1])
-    near, far = (sd.volume_errors(certain, ranking=False, limit=factor * limit) for factor in (1.0, 2.0))
+    near, far = (sd.volume(certain, ranking=False, limit=factor * limit) for factor in (1.0, 2.0))
     assert (near.verdict, far.verdict) == ("within", "within")
     assert near.interval_note
     assert any(near.interval_note in row for row in volume_report(near))
@@ -359,22 +359,22 @@ def test_limit_inside_the_interval_of_a_verdict_is_explained(certain: sd.Calibra
 
 
 def test_between_nodes_is_what_the_calibration_carries_unless_it_is_told(certain: sd.Calibration) -> None:
-    stated = sd.volume_errors(certain.with_between_nodes(1.0), ranking=False)
-    told = sd.volume_errors(certain, ranking=False, between_nodes=1.0)
+    stated = sd.volume(certain.with_between_nodes(1.0), ranking=False)
+    told = sd.volume(certain, ranking=False, between_nodes=1.0)
     assert (stated.between_nodes, stated.between_nodes_estimated) == (1.0, False)
     assert stated.largest_interval == told.largest_interval
-    assert sd.volume_errors(certain.with_between_nodes(1.0), ranking=False, between_nodes=0.5).between_nodes == 0.5
-    none_at_all = sd.volume_errors(certain.with_between_nodes(0.0), ranking=False)
+    assert sd.volume(certain.with_between_nodes(1.0), ranking=False, between_nodes=0.5).between_nodes == 0.5
+    none_at_all = sd.volume(certain.with_between_nodes(0.0), ranking=False)
     assert (none_at_all.between_nodes, none_at_all.between_nodes_estimated) == (0.0, False)
-    assert sd.volume_errors(certain, ranking=False).between_nodes_estimated
+    assert sd.volume(certain, ranking=False).between_nodes_estimated
 
 
 @pytest.mark.parametrize("name", ["c.csv", "c.nc"])
 def test_files_carry_what_was_stated_of_between_the_nodes(name: str, tmp_path: Path) -> None:
     stated = 0.7e-3 / 3.0  # of many digits
-    sd.write_calibration(calibrate(1), tmp_path / name, between_nodes=stated)
+    calibrate(1).write(tmp_path / name, between_nodes=stated)
     assert sd.read_calibration(tmp_path / name).between_nodes == stated
-    sd.write_calibration(calibrate(1), tmp_path / name)
+    calibrate(1).write(tmp_path / name)
     assert sd.read_calibration(tmp_path / name).between_nodes is None
     for wrong in (-1.0, float("nan")):
         refused(
@@ -384,7 +384,7 @@ def test_files_carry_what_was_stated_of_between_the_nodes(name: str, tmp_path: P
 
 def test_file_with_a_bad_statement_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "c.csv"
-    sd.write_calibration(calibrate(1), file, between_nodes=1e-3)
+    calibrate(1).write(file, between_nodes=1e-3)
     file.write_text(file.read_text().replace("# between_nodes_mm=0.001", "# between_nodes_mm=-1"))
     refused(sd.read_calibration, file, names='between_nodes_mm: expected a number of at least 0, got "-1"')
 
@@ -397,14 +397,14 @@ def test_between_nodes_of_a_parabola_is_its_mean_distance_from_its_chords() -> N
     functions = dict.fromkeys(FUNCTIONS, (nodes, known, known))
     functions["EXX"] = (nodes, 0.5 * q * nodes**2, known)
     squareness = dict.fromkeys(SQUARENESSES, (0.0, 0.0))
-    found = sd.volume_errors(sd.Calibration(**(parts | {"functions": functions, "squareness": squareness})))
+    found = sd.volume(sd.Calibration(**(parts | {"functions": functions, "squareness": squareness})))
     # The largest error is along X alone. Second differences of numbers of size 1 mm are rounded to 1e-16 mm.
     assert found.between_nodes == pytest.approx(q * 10.0**2 / np.sqrt(120.0), rel=1e-9)
     assert found.between_nodes_estimated
 
 
 def test_without_covariance_there_are_values_and_no_verdict() -> None:
-    found = sd.volume_errors(calibrate(1), limit=1.0)
+    found = sd.volume(calibrate(1), limit=1.0)
     assert found.largest > 0.0
     assert found.largest_interval is None
     assert all(figure.interval is None for figure in found.ranges.values())
@@ -413,7 +413,7 @@ def test_without_covariance_there_are_values_and_no_verdict() -> None:
 
 
 def test_rejected_fit_has_no_verdict(certain: sd.Calibration) -> None:
-    found = sd.volume_errors(certain.judged("rejected"), limit=1.0)
+    found = sd.volume(certain.judged("rejected"), limit=1.0)
     assert found.verdict is None
     assert "rejected" in found.no_verdict_because
 
@@ -422,7 +422,7 @@ def test_undetermined_parameters_leave_what_does_not_need_them() -> None:
     parts = parts_of(calibrate(1, full_covariance=True))
     del parts["functions"]["EXX"]
     del parts["covariance"]
-    found = sd.volume_errors(sd.Calibration(**parts), limit=1.0)
+    found = sd.volume(sd.Calibration(**parts), limit=1.0)
     assert found.missing == {"X": ("EXX",)}
     assert np.isnan([found.largest, found.rms, found.ranges["X"].value, found.diagonals["ppp"].value]).all()
     assert found.ranges["Y"].value > 0.0
@@ -433,7 +433,7 @@ def test_undetermined_parameters_leave_what_does_not_need_them() -> None:
 
 
 def test_box_inside_has_no_larger_error_than_the_volume(certain: sd.Calibration) -> None:
-    inside = sd.volume_errors(certain, box=[[10, 10, 10], [40, 40, 40]], ranking=False)
-    whole_volume = sd.volume_errors(certain, ranking=False)
+    inside = sd.volume(certain, box=[[10, 10, 10], [40, 40, 40]], ranking=False)
+    whole_volume = sd.volume(certain, ranking=False)
     assert inside.largest < whole_volume.largest
     assert inside.largest_interval is not None

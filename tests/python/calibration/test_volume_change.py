@@ -25,8 +25,8 @@ def test_figures_are_those_of_both_volumes_at_the_tool_of_a() -> None:
     a, b = calibrate(1), calibrate(2)
     parts = parts_of(b)
     parts["tool"] = (0.0, 0.0, 0.0)
-    change = sd.volume_change(sd.compare_calibrations(a, sd.Calibration(**parts)))
-    one, other = (sd.volume_errors(each, tool=TOOL, between_nodes=0.0, ranking=False) for each in (a, b))
+    change = sd.volume_change(sd.compare(a, sd.Calibration(**parts)))
+    one, other = (sd.volume(each, tool=TOOL, between_nodes=0.0, ranking=False) for each in (a, b))
     assert (change.largest.a, change.largest.b) == (one.largest, other.largest)
     assert (change.rms.a, change.rms.b) == (one.rms, other.rms)
     assert change.largest.change == other.largest - one.largest
@@ -35,15 +35,15 @@ def test_figures_are_those_of_both_volumes_at_the_tool_of_a() -> None:
 
 def test_what_lies_between_the_nodes_is_in_the_volumes_and_not_in_the_change() -> None:
     a, b = (calibrate(seed, full_covariance=True) for seed in (1, 2))
-    change = sd.volume_change(sd.compare_calibrations(a, b))
+    change = sd.volume_change(sd.compare(a, b))
     for own, interval, calibration in (
         (change.a, change.largest.a_interval, a),
         (change.b, change.largest.b_interval, b),
     ):
-        alone = sd.volume_errors(calibration, ranking=False)
+        alone = sd.volume(calibration, ranking=False)
         assert own.largest_interval == alone.largest_interval
         assert own.between_nodes == alone.between_nodes > 0.0
-        assert interval == sd.volume_errors(calibration, between_nodes=0.0, ranking=False).largest_interval
+        assert interval == sd.volume(calibration, between_nodes=0.0, ranking=False).largest_interval
 
 
 @pytest.mark.parametrize("name", ["EXX", "EZY", "EBX", "ECX", "EAZ", "C0Y", "A0Z"])
@@ -59,7 +59,7 @@ def test_effect_of_a_parameter_is_that_of_the_exact_machine_with_it_alone(name: 
         b = scaled(a, 1.5, name)
         position, value, _ = a.functions[name]
         errors = sd.ErrorMap({name: (position, 0.5 * value)})
-    (effect,) = sd.volume_change(sd.compare_calibrations(a, b)).effects
+    (effect,) = sd.volume_change(sd.compare(a, b)).effects
     axes = [np.linspace(0.0, edge, 41) for edge in VOLUME]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     size = np.linalg.norm(sd.Machine(CHAIN, errors, TOOL).error(points), axis=1)
@@ -72,7 +72,7 @@ def test_effect_of_a_parameter_is_that_of_the_exact_machine_with_it_alone(name: 
 
 
 def test_effects_are_ordered_and_marked_as_in_the_comparison() -> None:
-    comparison = sd.compare_calibrations(calibrate(1), scaled(calibrate(2), 0.2, "EXX"))
+    comparison = sd.compare(calibrate(1), scaled(calibrate(2), 0.2, "EXX"))
     effects = sd.volume_change(comparison).effects
     assert effects[0].parameter == "EXX"
     assert [effect.largest for effect in effects] == sorted((e.largest for e in effects), reverse=True)
@@ -81,7 +81,7 @@ def test_effects_are_ordered_and_marked_as_in_the_comparison() -> None:
 
 
 def test_calibration_compared_with_itself_has_no_effects() -> None:
-    change = sd.volume_change(sd.compare_calibrations(calibrate(1), calibrate(1)))
+    change = sd.volume_change(sd.compare(calibrate(1), calibrate(1)))
     assert change.effects == ()
     assert change.largest.change == change.rms.change == 0.0
 
@@ -120,14 +120,14 @@ def test_no_verdict_without_covariance_and_for_one_run_and_against_a_map() -> No
         "one of the two is an error map": (with_one, sd.random_error_map(VOLUME, seed=3, intervals=5)),
     }
     for reason, (a, b) in cases.items():
-        change = sd.volume_change(sd.compare_calibrations(a, b))
+        change = sd.volume_change(sd.compare(a, b))
         assert change.no_verdict_because == reason
         assert (change.largest.verdict, change.rms.verdict, change.rms.interval) == (None, None, None)
 
 
 def test_missing_parameter_leaves_figures_open_and_is_named() -> None:
     plan = sd.Plan(VOLUME, ["ppp", "npp", "pnp", "nnp"], 5)
-    change = sd.volume_change(sd.compare_calibrations(calibrate(1), calibrate(2, plan=plan)))
+    change = sd.volume_change(sd.compare(calibrate(1), calibrate(2, plan=plan)))
     assert change.no_verdict_because == "B does not determine slope of EXX, slope of EYY, slope of EZZ"
     assert math.isnan(change.largest.b)
     assert not math.isnan(change.largest.a)
@@ -138,7 +138,7 @@ def test_better_machine_is_improved_and_the_way_back_is_worse() -> None:
     a = calibrate(1, full_covariance=True)
     b = scaled(calibrate(2, full_covariance=True), 0.5)
     for before, after, verdict in ((a, b, "improved"), (b, a, "worse")):
-        change = sd.volume_change(sd.compare_calibrations(before, after))
+        change = sd.volume_change(sd.compare(before, after))
         assert (change.largest.verdict, change.rms.verdict, change.no_verdict_because) == (verdict, verdict, "")
         for figure in (change.largest, change.rms):
             assert figure.interval is not None
@@ -149,9 +149,7 @@ def test_better_machine_is_improved_and_the_way_back_is_worse() -> None:
 
 
 def test_two_calibrations_of_one_machine_tell_no_change() -> None:
-    change = sd.volume_change(
-        sd.compare_calibrations(calibrate(1, full_covariance=True), calibrate(2, full_covariance=True))
-    )
+    change = sd.volume_change(sd.compare(calibrate(1, full_covariance=True), calibrate(2, full_covariance=True)))
     assert (change.largest.verdict, change.rms.verdict) == ("cannot be told", "cannot be told")
 
 
@@ -160,17 +158,17 @@ def test_interval_covers_the_true_change_of_a_machine() -> None:
     """40 pairs of calibrations with much noise, 2 µm and 20 µrad, of two machines whose true errors are known."""
     plan, noise = small_plan(), {"distance": 2e-3, "tilt": 2e-5}
     machines = [sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=seed, intervals=5), TOOL) for seed in (3, 4)]
-    one, other = (sd.volume_errors(machine, box=[np.zeros(3), VOLUME], ranking=False) for machine in machines)
+    one, other = (sd.volume(machine, box=[np.zeros(3), VOLUME], ranking=False) for machine in machines)
 
     def calibration(machine: sd.Machine, seed: int) -> sd.Calibration:
         run = sd.simulate(machine, plan, sd.Head(), noise=sd.Noise(**noise, seed=seed))
-        stated = sd.ReadingUncertainty(**noise)
-        return sd.evaluate(run, plan, sd.Head(), CHAIN, TOOL, full_covariance=True, uncertainty=stated)
+        stated = sd.methods.ReadingUncertainty(**noise)
+        return sd.methods.evaluate(run, plan, sd.Head(), CHAIN, TOOL, full_covariance=True, uncertainty=stated)
 
     covered = {"largest": 0, "rms": 0}
     for seed in range(40):
         pair = (calibration(machine, 2 * seed + k) for k, machine in enumerate(machines))
-        change = sd.volume_change(sd.compare_calibrations(*pair))
+        change = sd.volume_change(sd.compare(*pair))
         for name, figure in (("largest", change.largest), ("rms", change.rms)):
             assert figure.interval is not None
             low, high = figure.interval

@@ -38,7 +38,7 @@ def one_moment(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- the round trip --------------------------------------------------------------------------------------------------
 def test_simulate_writes_what_the_library_simulates(here: Path) -> None:
     scenario = sd.read_scenario("scenario.toml")
-    sd.simulate_scenario(scenario).write("library.csv")
+    sd.simulate(scenario).write("library.csv")
     assert Path("run.csv").read_bytes() == Path("library.csv").read_bytes()
 
 
@@ -58,7 +58,7 @@ def test_evaluate_writes_what_the_library_evaluates(
 ) -> None:
     code = run("evaluate", "scenario.toml", "run.csv", "-m", method, "-o", "calibration.csv")
     scenario, measurement = sd.read_scenario("scenario.toml"), sd.read_measurement("run.csv")
-    calibration = sd.evaluate_scenario(scenario, measurement, method=method)
+    calibration = sd.methods.evaluate_scenario(scenario, measurement, method=method)
     if method != "adjustment":
         judged = evaluate_beside_adjustment(scenario, measurement, method=method)
         np.testing.assert_equal(dict(judged.calibration.functions), dict(calibration.functions))

@@ -16,10 +16,10 @@ from stepdiag.parameters import FUNCTIONS
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    sd.write_calibration(calibrate(1, method="enhanced").dated("2026-01-02T03:04:05Z"), "a.csv")
+    calibrate(1, method="enhanced").dated("2026-01-02T03:04:05Z").write("a.csv")
     parts = parts_of(calibrate(2, full_covariance=True))
     parts["functions"]["EXX"][1][3] += 5e-3
-    sd.write_calibration(sd.Calibration(**parts), "b.nc")
+    sd.Calibration(**parts).write("b.nc")
     return tmp_path
 
 
@@ -44,7 +44,7 @@ def test_command_with_a_small_limit_marks_nothing(here: Path, capsys: pytest.Cap
 def test_differences_are_written(here: Path) -> None:
     assert main(["compare", "a.csv", "b.nc", "-o", "differences.csv"]) == 0
     assert main(["compare", "a.csv", "b.nc", "-o", "differences.nc"]) == 0
-    comparison = sd.compare_calibrations(sd.read_calibration("a.csv"), sd.read_calibration("b.nc"))
+    comparison = sd.compare(sd.read_calibration("a.csv"), sd.read_calibration("b.nc"))
     lines = Path("differences.csv").read_text().splitlines()
     assert "# date_a=2026-01-02T03:04:05Z" in lines
     rows = [line.split(",") for line in lines if not line.startswith("#")]
@@ -80,7 +80,7 @@ def test_mistakes_of_a_comparison_are_told_in_a_line(
     here: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("map.csv").write_text("parameter,position_mm,value,unit,standard_uncertainty\nEXX,0,0,um,\n")
-    sd.write_calibration(sd.Calibration(**(parts_of(calibrate(1)) | {"chain": "[w b X Y Z t]"})), "other.csv")
+    sd.Calibration(**(parts_of(calibrate(1)) | {"chain": "[w b X Y Z t]"})).write("other.csv")
     before = {path.name: path.read_bytes() for path in here.iterdir()}
     assert main(["compare", *arguments]) == 2
     said = capsys.readouterr().err
@@ -92,7 +92,7 @@ def test_mistakes_of_a_comparison_are_told_in_a_line(
 def test_volume_before_and_after_stands_before_the_parameters(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "a.csv", "b.nc"]) == 0
     said = capsys.readouterr().out.splitlines()
-    change = sd.volume_change(sd.compare_calibrations(sd.read_calibration("a.csv"), sd.read_calibration("b.nc")))
+    change = sd.volume_change(sd.compare(sd.read_calibration("a.csv"), sd.read_calibration("b.nc")))
     (largest,) = (line.split() for line in said if line.startswith("  largest "))
     assert largest[1:4] == [
         f"{value * 1e3:.4g}" for value in (change.largest.a, change.largest.b, change.largest.change)
@@ -111,10 +111,10 @@ def test_volume_before_and_after_stands_before_the_parameters(here: Path, capsys
 def test_calibration_is_compared_with_the_truth(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     truth = sd.random_error_map((80.0, 60.0, 50.0), seed=3, intervals=5)
     truth.write("truth.csv")
-    sd.write_calibration(calibrate(1, full_covariance=True), "c.nc")
+    calibrate(1, full_covariance=True).write("c.nc")
     assert main(["compare", "c.nc", "truth.csv"]) == 0
     said = capsys.readouterr().out.splitlines()
-    agreement = sd.compare_calibrations(sd.read_calibration("c.nc"), truth).agreement
+    agreement = sd.compare(sd.read_calibration("c.nc"), truth).agreement
     assert agreement is not None
     assert said[1] == "B: truth.csv: error map, date not known"
     assert any(

@@ -143,7 +143,7 @@ def test_init_makes_a_sheet_with_every_commanded_point(here: Path) -> None:
     sheet = sd.read_measurement("machine/measurement.csv")
     assert len(sheet) == 2 * (4 * 31 + 21 + 3 * 11)
     assert sheet.channels.keys() == {"distance", "alpha", "beta"}
-    simulated = sd.simulate_scenario(scenario)
+    simulated = sd.simulate(scenario)
     assert (sheet.line, sheet.point.tolist()) == (simulated.line, simulated.point.tolist())
     assert sheet.position.tolist() == simulated.position.tolist()
 
@@ -169,7 +169,7 @@ def test_sheet_has_the_runs_of_all_orders_and_directions(here: Path) -> None:
     Path("orders.toml").write_text(SCENARIO.replace("steps = 5", keys))
     assert run("init", "-o", "sheets", "--sheet-for", "orders.toml") == 0
     sheet = sd.read_measurement("sheets/measurement.csv")
-    simulated = sd.simulate_scenario(sd.read_scenario("orders.toml"))
+    simulated = sd.simulate(sd.read_scenario("orders.toml"))
     for name in ("line", "direction"):
         assert getattr(sheet, name) == getattr(simulated, name)
     for name in ("run", "point", "position"):

@@ -45,7 +45,7 @@ def test_show_draws_the_same_bytes_again(head: str) -> None:
 
 def test_figure_names_every_component() -> None:
     run("head", "show", "beam_and_psd", "-o", "head.svg")
-    design = sd.shipped_head("beam_and_psd")
+    design = sd.optics.shipped_head("beam_and_psd")
     drawn = Path("head.svg").read_text()
     for part in [*design.bodies, *design.beams, *design.sensors]:
         assert f"<!-- {part.name} -->" in drawn  # matplotlib's remark on the outlines of a text
@@ -150,7 +150,7 @@ def test_head_of_a_thousand_faces_works() -> None:
         '[body.disc]\nshape = "polyhedron"\nposition_mm = [0.0, 10.0, 400.0]\nmaterial = 1.6\n'
         f"corners_mm = {corners}\nfaces = {[list(range(1000)), list(range(1000, 2000)), *rim]}\n"
     )
-    design = sd.parse_head_design(far_plates(170) + disc)
+    design = sd.optics.parse_head_design(far_plates(170) + disc)
     assert sum(len(body.surfaces) for body in design.bodies) == 6 * 171 + 1002
     head = sd.Head.from_design(design, standoff=500.0)
     # 5 mm and 170 mm of N-BK7 (n = 1.5009 in vacuum) and 4 mm of index 1.6 over air, 1.0003.
@@ -233,7 +233,7 @@ def test_replay_that_differs_from_its_trace_is_told_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def differs(_: object) -> None:
-        raise sd.ReplayMismatch("line ppp, point 3: replay and trace differ")
+        raise sd.optics.ReplayMismatch("line ppp, point 3: replay and trace differ")
 
     run("init", "-o", "machine", "--head", "three_beams")
     monkeypatch.setattr("stepdiag.scenario.description.simulate_scenario", differs)

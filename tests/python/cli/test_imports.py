@@ -28,7 +28,7 @@ def test_help_imports_neither_numpy_nor_a_command() -> None:
 
 def test_evaluating_to_csv_imports_no_netcdf_and_no_search_that_is_not_made(tmp_path: Path) -> None:
     scenario, run = EXAMPLES / "scenario.toml", tmp_path / "run.csv"
-    sd.simulate_scenario(sd.read_scenario(scenario)).write(run)
+    sd.simulate(sd.read_scenario(scenario)).write(run)
     modules = (
         "netCDF4 xarray pandas matplotlib numpy.ma concurrent.futures tqdm "
         "stepdiag.head.description stepdiag.objects.evaluation stepdiag.cli.acquire"

@@ -37,7 +37,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             assert main(command.split()) == 0
         errors = sd.read_scenario("scenario.toml").machine().errors
         errors.write("map.csv")
-        sd.write_calibration(sd.read_calibration("a.csv").judged("rejected", ["it contradicts itself"]), "bad.csv")
+        sd.read_calibration("a.csv").judged("rejected", ["it contradicts itself"]).write("bad.csv")
         Path("notes.txt").write_text("my notes\n")
     return folder
 

@@ -53,13 +53,15 @@ def test_few_cycles_and_left_out_targets_stand_in_the_first_lines(
 
 def test_calibration_is_reported_along_axes_and_diagonals(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     calibration = calibrate(1, full_covariance=True)
-    sd.write_calibration(calibration, "c.nc")
+    calibration.write("c.nc")
     lines = said(capsys, "c.nc")
     rows = {line.split()[0]: line.split() for line in lines if line.startswith("  ")}
     assert [*rows][:8] == ["µm", "X", "Y", "Z", "ppp", "npp", "pnp", "nnp"]
     for name, row in rows.items():
         if name in ("ppp", "npp"):
-            figure = sd.predict_positions(calibration, *sd.diagonal_line(calibration, name)).figures["E_up"]
+            figure = sd.positions.predict_positions(
+                calibration, *sd.positions.diagonal_line(calibration, name)
+            ).figures["E_up"]
             assert figure.interval is not None
             low, high = figure.interval
             assert row[7:] == [f"{figure.value * 1e3:.4g}", f"{low * 1e3:.4g}", "to", f"{high * 1e3:.4g}"]
@@ -67,8 +69,8 @@ def test_calibration_is_reported_along_axes_and_diagonals(here: Path, capsys: py
 
 def test_one_line_is_reported_in_full(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = simulate(1, repeats=2, backward=True)
-    calibration = sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
-    sd.write_calibration(calibration, "c.nc")
+    calibration = sd.methods.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
+    calibration.write("c.nc")
     lines = said(capsys, "c.nc", "--axis", "X", "--at", "0,30,20", "--points", "5")
     assert "X: from 0 30 20 to 80 30 20 mm, 5 targets" in lines
     symbols = [line.split()[0] for line in lines if line.startswith("  ")][1:]
@@ -79,7 +81,7 @@ def test_one_line_is_reported_in_full(here: Path, capsys: pytest.CaptureFixture[
 
 
 def test_rejected_calibration_ends_with_its_code(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sd.write_calibration(calibrate(1).judged("rejected", ["a test"]), "c.csv")
+    calibrate(1).judged("rejected", ["a test"]).write("c.csv")
     lines = said(capsys, "c.csv", code=3)
     assert lines[0].startswith("fit: REJECTED")
     assert "warning: c.csv: the fit is rejected: do not use this calibration" in lines
@@ -116,7 +118,7 @@ def test_mistakes_with_readings_are_named(
 def test_mistakes_with_a_calibration_are_named(
     arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sd.write_calibration(calibrate(1), "c.csv")
+    calibrate(1).write("c.csv")
     assert message in said(capsys, "c.csv", *arguments, code=2)[0]
 
 
@@ -127,7 +129,7 @@ def test_readings_are_known_to_check(here: Path, capsys: pytest.CaptureFixture[s
 
 def test_object_of_readings_has_the_figures_of_the_result(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = printed("positions", capsys, "positions", str(READINGS))
-    result = sd.evaluate_positions(sd.read_positions(READINGS))
+    result = sd.positions.evaluate_positions(sd.positions.read_positions(READINGS))
     assert found["predicted"] is None
     own = found["measured"]
     assert (own["line"], own["readings"], own["lost"], own["cycles"]) == (
@@ -153,12 +155,12 @@ def test_object_of_readings_has_the_figures_of_the_result(here: Path, capsys: py
 
 def test_object_of_a_calibration_has_its_lines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = simulate(1, repeats=2, backward=True)
-    calibration = sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
-    sd.write_calibration(calibration, "c.nc")
+    calibration = sd.methods.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
+    calibration.write("c.nc")
     found = printed("positions", capsys, "positions", "c.nc")
     assert found["measured"] is None
     assert [line["name"] for line in found["predicted"]["lines"]] == ["X", "Y", "Z", "ppp", "npp", "pnp", "nnp"]
-    expected = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"))
+    expected = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X"))
     line = found["predicted"]["lines"][0]
     assert line["up_um"] == pytest.approx((expected.up * 1e3).tolist(), rel=1e-15)
     assert line["figures"]["B"]["value_um"] == pytest.approx(expected.figures["B"].value * 1e3, rel=1e-15)
@@ -168,5 +170,5 @@ def test_object_of_a_calibration_has_its_lines(here: Path, capsys: pytest.Captur
     diagonal = found["predicted"]["lines"][3]
     assert diagonal["reversal_um"] == [None] * 6
     assert diagonal["reasons"]
-    sd.write_calibration(calibration.judged("rejected"), "bad.nc")
+    calibration.judged("rejected").write("bad.nc")
     assert len(printed("positions", capsys, "positions", "bad.nc", status=3)["warnings"]) == 1

@@ -176,7 +176,7 @@ def in_terminal(*arguments: str) -> str:
 def test_command_has_colours_on_a_terminal_and_none_in_a_pipe(tmp_path: Path) -> None:
     scenario, run = tmp_path / "scenario.toml", tmp_path / "run.csv"
     scenario.write_text(SCENARIO)
-    sd.write_measurement(sd.simulate_scenario(sd.read_scenario(scenario)), run)
+    sd.simulate(sd.read_scenario(scenario)).write(run)
     arguments = ("check", str(scenario), str(run))
     shown = in_terminal(*arguments)
     piped = subprocess.run([sys.executable, "-m", "stepdiag", *arguments], capture_output=True, text=True, check=True)

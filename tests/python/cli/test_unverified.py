@@ -165,7 +165,7 @@ def test_read_and_written_in_python_it_stays_unverified(here: Path, edited: str)
     read = sd.read_calibration(edited)
     assert read.unverified
     for copy in ("copy.csv", "copy.nc"):
-        sd.write_calibration(read, copy)
+        read.write(copy)
         assert sd.read_calibration(copy).unverified
         assert sd.read_calibration(copy).provenance == read.provenance
         assert sd.read_calibration(copy).dated("2026-01-01").unverified
@@ -173,7 +173,7 @@ def test_read_and_written_in_python_it_stays_unverified(here: Path, edited: str)
 
 
 def test_compensator_refuses_it_unless_told(here: Path) -> None:
-    sd.write_calibration(sd.read_calibration(EDITED), "copy.csv")
+    sd.read_calibration(EDITED).write("copy.csv")
     for table in (EDITED, "copy.csv", sd.read_calibration("edited.nc"), sd.read_calibration(EDITED).to_error_map()):
         with pytest.raises(sd.InvalidArgument, match=r"unverified: a checksum was absent .*accept_unverified"):
             sd.Compensator(table, CHAIN)

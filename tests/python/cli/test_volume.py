@@ -14,8 +14,8 @@ from stepdiag.cli import main
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    sd.write_calibration(calibrate(1, full_covariance=True), "c.nc")
-    sd.write_calibration(calibrate(1), "c.csv")
+    calibrate(1, full_covariance=True).write("c.nc")
+    calibrate(1).write("c.csv")
     return tmp_path
 
 
@@ -30,7 +30,7 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> 
 def test_first_line_is_the_verdict(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert said(capsys, "c.nc", "--limit", "1000")[0].startswith("machine: within 1000 µm: the largest error is below ")
     assert said(capsys, "c.nc", "--limit", "1")[0].startswith("machine: not within 1 µm: the largest error is above ")
-    largest = sd.volume_errors(sd.read_calibration("c.nc")).largest * 1e3
+    largest = sd.volume(sd.read_calibration("c.nc")).largest * 1e3
     assert said(capsys, "c.nc", "--limit", f"{largest}")[0].startswith("machine: undecided at ")
 
 
@@ -50,7 +50,7 @@ def test_file_without_covariance_has_values_and_says_why_there_is_no_verdict(
 def test_object_has_the_values_of_the_library(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ("c.nc", "--limit", "20", "--tool", "0,0,50", "--box", "0:80,10:50,0:50", "--between-nodes", "0.5")
     content = printed("volume", capsys, "volume", *arguments)
-    found = sd.volume_errors(
+    found = sd.volume(
         sd.read_calibration("c.nc"),
         limit=0.02,
         tool=(0, 0, 50),
@@ -79,11 +79,11 @@ def test_scenario_states_what_lies_between_the_nodes(
     capsys.readouterr()
     assert sd.read_calibration(name).between_nodes == pytest.approx(0.7e-3, rel=1e-15)
     scenario = sd.read_scenario("s.toml")
-    found = sd.evaluate_scenario(scenario, sd.read_measurement("r.csv"), method=method)  # type: ignore[arg-type]
+    found = sd.methods.evaluate_scenario(scenario, sd.read_measurement("r.csv"), method=method)  # type: ignore[arg-type]
     assert found.between_nodes == scenario.known.between_nodes
-    found = sd.volume_errors(sd.read_calibration(name), ranking=False)
+    found = sd.volume(sd.read_calibration(name), ranking=False)
     assert (found.between_nodes, found.between_nodes_estimated) == (scenario.known.between_nodes, False)
-    told = sd.volume_errors(sd.read_calibration(name), between_nodes=1e-4, ranking=False)
+    told = sd.volume(sd.read_calibration(name), between_nodes=1e-4, ranking=False)
     assert told.between_nodes == 1e-4
     if name == "e.nc" and method == "adjustment":
         assert any("between nodes (stated): standard uncertainty 0.7 µm" in line for line in said(capsys, name))
@@ -95,7 +95,7 @@ def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: py
     assert content["verdict"] is None
     parts = parts_of(calibrate(1))
     del parts["functions"]["EXX"]
-    sd.write_calibration(sd.Calibration(**parts), "m.csv")
+    sd.Calibration(**parts).write("m.csv")
     content = printed("volume", capsys, "volume", "m.csv")
     assert content["largest_um"] is content["at_mm"] is content["ranges"]["X"]["value_um"] is None
     assert content["missing"] == {"X": ["EXX"]}
@@ -103,7 +103,7 @@ def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: py
 
 
 def test_rejected_fit_is_told_first_and_ends_with_code_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sd.write_calibration(sd.read_calibration("c.nc").judged("rejected", ["it was dropped"]), "r.nc")
+    sd.read_calibration("c.nc").judged("rejected", ["it was dropped"]).write("r.nc")
     lines = said(capsys, "r.nc", "--limit", "1000", code=3)
     assert lines[0] == "calibration REJECTED: do not use it (fit: rejected)"
     assert any(line.startswith("warning: r.nc: the fit is rejected") for line in lines)
@@ -111,7 +111,7 @@ def test_rejected_fit_is_told_first_and_ends_with_code_3(here: Path, capsys: pyt
 
 
 def test_doubt_about_the_calibration_is_told_before_the_machine(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sd.write_calibration(sd.read_calibration("c.nc").judged("doubtful", ["more noise than stated"]), "d.nc")
+    sd.read_calibration("c.nc").judged("doubtful", ["more noise than stated"]).write("d.nc")
     first, second = said(capsys, "d.nc", "--limit", "1")[:2]
     assert first == "calibration DOUBTFUL: do not rely on the stated uncertainties (fit: doubtful)"
     assert second.startswith("machine: not within 1 µm: ")

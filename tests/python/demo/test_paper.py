@@ -83,7 +83,9 @@ def test_adjustment_removes_the_zero_error_of_the_traced_psd(results: dict[str, 
     assert abs(largest["straightness"].value) <= 1.8e-6
     assert abs(largest["angle"].value) <= 7e-9
     found = [
-        e for e in sd.adjust_scenario(results["3"].scenario, results["3"].measurement).setup if e.quantity == "psd_zero"
+        e
+        for e in sd.methods.adjust_scenario(results["3"].scenario, results["3"].measurement).setup
+        if e.quantity == "psd_zero"
     ]
     for e in found:
         assert e.value == pytest.approx((1.5, 2.0)[e.component], abs=1e-4)  # 34 nm beside a second-order term or two
@@ -134,7 +136,9 @@ def test_traced_readings_are_the_defined_ones_to_second_order(results: dict[str,
 def test_traced_run_evaluated_with_the_defined_head_gives_the_defined_calibration(results: dict[str, Result]) -> None:
     traced, defined = results["3"], results["3d"]
     known, head = traced.scenario.known, defined.scenario.known.head
-    ours = sd.evaluate(traced.measurement, known.plan, head, known.chain, known.tool, method="enhanced").functions
+    ours = sd.methods.evaluate(
+        traced.measurement, known.plan, head, known.chain, known.tool, method="enhanced"
+    ).functions
     theirs = defined.calibrations["enhanced"].functions
     for name in theirs:
         # 34 nm of spot over an arm of twice 131 mm are 130 nrad, most of it constant along a line; over a lateral

@@ -47,7 +47,7 @@ OF_NOMINAL = 3e-7
 def test_distances_are_those_of_the_formula_with_a_drifting_air(text: str) -> None:
     """L_i = (n_used (D_i - D_0) + n_0 L_0)/n_i by the conventions, the index by the library's Ciddor alone."""
     scenario = parse_scenario(text)
-    sound = sd.simulate_scenario(parse_scenario(PERFECT))
+    sound = sd.simulate(parse_scenario(PERFECT))
     wavelength, standoff = scenario.known.head.wavelength, scenario.known.head.standoff
     count = np.arange(len(sound))
     air = {
@@ -78,7 +78,7 @@ def test_distances_are_those_of_the_formula_with_a_drifting_air(text: str) -> No
 @pytest.mark.parametrize("text", [COUNTED, IN_VACUUM])
 def test_a_simulated_run_is_found_as_it_was(text: str) -> None:
     scenario = parse_scenario(text)
-    run, sound = sd.simulate_scenario(scenario), sd.simulate_scenario(parse_scenario(PERFECT))
+    run, sound = sd.simulate(scenario), sd.simulate(parse_scenario(PERFECT))
     assert run.channels["air_temperature"] == pytest.approx(26.0)
     raw, reduced, truth = (
         without_constants(run, one.channels["distance"]) for one in (run, reduced_run(scenario.known, run), sound)
@@ -89,12 +89,12 @@ def test_a_simulated_run_is_found_as_it_was(text: str) -> None:
 
 def test_a_lost_first_reading_and_empty_fields_do_no_harm() -> None:
     scenario = parse_scenario(COUNTED)
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     first = [i for i in range(len(run)) if run.point[i] == 0]
     distance, warm = run.channels["distance"].copy(), run.channels["air_temperature"].copy()
     distance[first], warm[3:9] = np.nan, np.nan
     found = reduced_run(scenario.known, with_channels(run, {"distance": distance, "air_temperature": warm}))
-    sound = sd.simulate_scenario(parse_scenario(PERFECT)).channels["distance"].copy()
+    sound = sd.simulate(parse_scenario(PERFECT)).channels["distance"].copy()
     sound[first] = np.nan
     difference = without_constants(run, found.channels["distance"]) - without_constants(run, sound)
     assert np.count_nonzero(np.isnan(difference)) == len(first)
@@ -103,9 +103,9 @@ def test_a_lost_first_reading_and_empty_fields_do_no_harm() -> None:
 
 def test_a_run_without_air_is_refused() -> None:
     scenario = parse_scenario(COUNTED)
-    run = sd.simulate_scenario(parse_scenario(PERFECT))
+    run = sd.simulate(parse_scenario(PERFECT))
     with pytest.raises(sd.InvalidArgument, match=r"environment.readings: .*expected a column air_temperature_c"):
-        sd.adjust_scenario(scenario, run)
+        sd.methods.adjust_scenario(scenario, run)
     with pytest.raises(sd.InvalidArgument, match=r"expected air_pressure recorded on line .*, got none; an assumed"):
         _core.in_recorded_air(
             with_channels(run, {"air_temperature": np.full(len(run), 20.0)}),
@@ -117,6 +117,6 @@ def test_a_run_without_air_is_refused() -> None:
 
 def test_a_result_lists_the_index_of_the_air_where_the_instrument_counted_in_vacuum() -> None:
     scenario = parse_scenario(IN_VACUUM)
-    rows = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario)).conditions
+    rows = sd.methods.evaluate_scenario(scenario, sd.simulate(scenario)).conditions
     air = sd.Environment.from_air(temperature=26.0, pressure=99_000.0).refractive_index(scenario.known.head.wavelength)
     assert f"index of that air: {air:.8f}, counted with 1.00000000" in rows

@@ -11,7 +11,7 @@ import stepdiag as sd
 
 REPETITIONS = 4000
 DISTANCE, TILT, SPOT = 1e-4, 1e-6, 2e-3  # mm, rad, mm
-UNCERTAINTY = sd.ReadingUncertainty(distance=DISTANCE, tilt=TILT, spot=SPOT)
+UNCERTAINTY = sd.methods.ReadingUncertainty(distance=DISTANCE, tilt=TILT, spot=SPOT)
 SIGMA = {"distance": DISTANCE, "alpha": TILT, "beta": TILT, "spot_x": SPOT, "spot_y": SPOT}
 
 HEADS = {

@@ -34,7 +34,7 @@ def simulate(setup: Setup, truth: sd.ErrorMap, misalignment: sd.Misalignment | N
 
 
 def shipped(name: str, **options: object) -> sd.Head:
-    return sd.Head.from_design(sd.shipped_head(name), **options)
+    return sd.Head.from_design(sd.optics.shipped_head(name), **options)
 
 
 def defined_like(head: sd.Head) -> sd.Head:
@@ -95,7 +95,7 @@ def test_heads_by_line_give_what_one_head_gives() -> None:
     for name, values in run.channels.items():
         assert np.array_equal(values, by_line.channels[name])
     one, four = (
-        sd.evaluate(run, setup.plan, used, setup.chain, setup.tool, method="enhanced") for used in (head, same)
+        sd.methods.evaluate(run, setup.plan, used, setup.chain, setup.tool, method="enhanced") for used in (head, same)
     )
     for name, columns in one.functions.items():
         assert np.array_equal(columns[1], four.functions[name][1])
@@ -116,7 +116,7 @@ def test_heads_of_different_kinds_on_different_lines_agree() -> None:
         **{line: sd.Head("multi_beam", beam_offsets=[(0.0, 0.0), (30.0, 0.0), (0.0, 30.0)]) for line in SCALE_LINES},
     }
     run = sd.simulate(machine, setup.plan, different, misalignment=dict.fromkeys(DIAGONALS, REFLECTOR))
-    calibration = sd.evaluate(run, setup.plan, different, setup.chain, setup.tool, method="enhanced")
+    calibration = sd.methods.evaluate(run, setup.plan, different, setup.chain, setup.tool, method="enhanced")
     error = worst(calibration, truth)
     assert error.position <= TURNED[0]
     assert error.angle <= TURNED[1]
@@ -125,7 +125,7 @@ def test_heads_of_different_kinds_on_different_lines_agree() -> None:
 @pytest.mark.parametrize("name", ["three_beams", "beam_and_psd"])
 def test_evaluation_sees_no_pose_errors(name: str) -> None:
     """Only a nominal calibration crosses from the simulator: the evaluation is the same bits with or without them."""
-    design = sd.shipped_head(name)
+    design = sd.optics.shipped_head(name)
     parts = [part.name for part in [*design.bodies, *design.beams, *design.sensors]]
     errors = dict.fromkeys(parts, ((0.02, -0.01, 0.03), (5e-05, 8e-05, -6e-05)))
     displaced, sound = shipped(name, pose_errors=errors), shipped(name)
@@ -138,7 +138,7 @@ def test_evaluation_sees_no_pose_errors(name: str) -> None:
     truth = setup.errors(6)
     run = setup.simulate(truth)
     with_errors, without = (
-        sd.evaluate(run, setup.plan, head, setup.chain, method="enhanced") for head in (displaced, sound)
+        sd.methods.evaluate(run, setup.plan, head, setup.chain, method="enhanced") for head in (displaced, sound)
     )
     for function, columns in with_errors.functions.items():
         assert np.array_equal(columns[1], without.functions[function][1])

@@ -70,7 +70,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("name", RUNS)
 def test_every_way_gives_the_same_verdict(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    RUNS[name](sd.simulate_scenario(sd.read_scenario("scenario.toml"))).write("run.csv")
+    RUNS[name](sd.simulate(sd.read_scenario("scenario.toml"))).write("run.csv")
     expect_one_verdict("scenario.toml", "run.csv", capsys)
 
 
@@ -102,7 +102,7 @@ def expect_one_verdict(scenario: str, run: str, capsys: pytest.CaptureFixture[st
 
 def test_a_mistake_rejects_the_run_and_is_its_first_reason(folder: Path) -> None:
     scenario = sd.read_scenario("scenario.toml")
-    judged = sd.judge(scenario, RUNS["tilts with the wrong sign"](sd.simulate_scenario(scenario)))
+    judged = sd.judge(scenario, RUNS["tilts with the wrong sign"](sd.simulate(scenario)))
     assert judged.fit == "rejected"
     assert judged.mistakes
     assert judged.adjustment is not None
@@ -113,7 +113,7 @@ def test_a_mistake_rejects_the_run_and_is_its_first_reason(folder: Path) -> None
 @pytest.mark.parametrize("method", ["enhanced", "conventional"])
 def test_a_linear_method_has_the_worse_of_both_verdicts(folder: Path, method: str) -> None:
     scenario = sd.read_scenario("scenario.toml")
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     sound = sd.judge(scenario, run, method=method)  # type: ignore[arg-type]
     assert sound.adjustment is not None
     assert sound.adjustment.verdict.fit == sd.judge(scenario, run).fit
@@ -129,7 +129,7 @@ def test_thresholds_are_those_of_the_core() -> None:
 
 def test_a_judgement_has_what_was_done_about_the_readings(folder: Path) -> None:
     scenario = sd.read_scenario("scenario.toml")
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     tilt = sd.judge(scenario, wrong("alpha", slice(7, 8), 1e-4)(run))
     assert [(reading.row, reading.channel) for reading in tilt.left_out] == [(7, "alpha")]
     assert tilt.freed == []

@@ -27,7 +27,7 @@ def fits(method: str, run: sd.Measurement, plan: sd.Plan = PLAN, runs: int = 150
         for name, u in STATED.items():
             channels[name] = channels[name] + u * random.standard_normal(len(run))
         noisy = sd.Measurement(run.line, run.point.tolist(), run.position, channels)
-        found.append(sd.evaluate(noisy, plan, sd.Head(), CHAIN, (0, 0, 0), method=method))
+        found.append(sd.methods.evaluate(noisy, plan, sd.Head(), CHAIN, (0, 0, 0), method=method))
     return found
 
 
@@ -86,7 +86,7 @@ def scenario() -> str:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("scenario.toml").write_text(scenario())
-    sd.simulate_scenario(sd.read_scenario("scenario.toml")).write("run.csv")
+    sd.simulate(sd.read_scenario("scenario.toml")).write("run.csv")
     return tmp_path
 
 

@@ -30,7 +30,7 @@ def one_reading(size: float) -> Spoil:
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> sd.Measurement:
     monkeypatch.chdir(tmp_path)
     Path("scenario.toml").write_text(SOUND)
-    return sd.simulate_scenario(sd.read_scenario("scenario.toml"))
+    return sd.simulate(sd.read_scenario("scenario.toml"))
 
 
 def with_distance(run: sd.Measurement, spoil: Spoil) -> sd.Measurement:
@@ -90,7 +90,7 @@ def test_another_volume_is_an_error_that_tells_its_edge(
     other = sd.read_scenario("other.toml")
     stretched = run.position * np.array([edge / true_edge if axis == a else 1.0 for a in "XYZ"])
     moved = sd.Measurement(run.line, run.point.tolist(), stretched, dict(run.channels))
-    refused(sd.evaluate_scenario, other, moved, method=method, names="the readings fit a travel of ")
+    refused(sd.methods.evaluate_scenario, other, moved, method=method, names="the readings fit a travel of ")
 
 
 def test_limits_are_those_of_the_scenario(run: sd.Measurement, capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,12 +110,17 @@ def test_a_large_value_of_larger_uncertainty_is_no_error() -> None:
     plan = sd.Plan((800, 600, 500), ["pp0", "np0", "p0p", "n0p", "0pp", "0np"], 5)
     machine = sd.Machine("[w X' b Y Z t]")
     run = sd.simulate(machine, plan, sd.Head("ideal"), noise=sd.Noise(distance=1.0, seed=2))
-    calibration = sd.evaluate(
-        run, plan, sd.Head("ideal"), machine.chain, method="enhanced", uncertainty=sd.ReadingUncertainty(distance=1.0)
+    calibration = sd.methods.evaluate(
+        run,
+        plan,
+        sd.Head("ideal"),
+        machine.chain,
+        method="enhanced",
+        uncertainty=sd.methods.ReadingUncertainty(distance=1.0),
     )
     assert any(np.max(np.abs(value)) > 2.0 for _, value, _ in calibration.functions.values())
 
 
 def test_limits_that_are_none_are_refused() -> None:
     for value in (0.0, -1.0, float("nan")):
-        refused(sd.PlausibleLimits, rotation=value, names="plausible rotation: expected a positive limit")
+        refused(sd.methods.PlausibleLimits, rotation=value, names="plausible rotation: expected a positive limit")

@@ -116,7 +116,7 @@ def test_uncertainties_of_one_step_are_the_closed_forms() -> None:
     """
     setup = Setup(steps=3)
     run = setup.simulate(setup.errors(1))
-    reading = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6)
+    reading = sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6)
     n = np.array(setup.volume) / np.linalg.norm(setup.volume)
     assert 1 / (2 * n) == pytest.approx([0.699, 0.932, 1.118], abs=5e-4)
     assert 1 / (2 * np.sqrt(1 - n**2)) == pytest.approx([0.716, 0.593, 0.559], abs=5e-4)

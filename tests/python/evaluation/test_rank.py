@@ -217,7 +217,7 @@ def test_line_of_large_uncertainty_counts_for_nothing() -> None:
 def test_uncertainty_columns_say_the_same_as_the_option() -> None:
     setup = Setup(steps=10)
     run = setup.simulate(setup.errors(2), noise=sd.Noise(distance=1e-4, tilt=1e-6, seed=8))
-    option = setup.evaluate(run, uncertainty=sd.ReadingUncertainty(distance=3e-4, tilt=2e-6))
+    option = setup.evaluate(run, uncertainty=sd.methods.ReadingUncertainty(distance=3e-4, tilt=2e-6))
     ones = np.ones(len(run))
     columns = changed(run, standard_uncertainty={"distance": 3e-4 * ones, "alpha": 2e-6 * ones, "beta": 2e-6 * ones})
     for name, (_, value, u) in setup.evaluate(columns).functions.items():

@@ -20,7 +20,7 @@ def measured(runs: int) -> tuple[sd.Measurement, sd.Plan]:
 
 @pytest.mark.parametrize("method", ["enhanced", "conventional"])
 def test_many_noiseless_runs_give_the_calibration_of_one(method: str) -> None:
-    one, many = (sd.evaluate(*measured(runs), sd.Head(), CHAIN, method=method) for runs in (1, RUNS))
+    one, many = (sd.methods.evaluate(*measured(runs), sd.Head(), CHAIN, method=method) for runs in (1, RUNS))
     for name, (_, values, uncertainties) in one.functions.items():
         _, of_many, smaller = many.functions[name]
         np.testing.assert_allclose(of_many, values, rtol=0.0, atol=1e-12, err_msg=name)
@@ -32,7 +32,7 @@ def test_many_noiseless_runs_give_the_calibration_of_one(method: str) -> None:
 @pytest.mark.parametrize("method", ["enhanced", "conventional"])
 def test_covariance_of_many_runs_is_that_of_one_by_their_number(method: str) -> None:
     one, many = (
-        sd.evaluate(*measured(runs), sd.Head(), CHAIN, method=method, full_covariance=True).covariance
+        sd.methods.evaluate(*measured(runs), sd.Head(), CHAIN, method=method, full_covariance=True).covariance
         for runs in (1, RUNS)
     )
     np.testing.assert_allclose(RUNS * many, one, rtol=0.0, atol=1e-12 * np.abs(one).max())

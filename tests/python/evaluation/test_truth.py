@@ -69,7 +69,7 @@ def test_displaced_position_sensing_device_spoils_the_angles() -> None:
 
 def test_noisy_run_is_recovered_within_its_uncertainties() -> None:
     setup, run, truth = known_run("noisy")  # 0.1 um and 1 urad
-    calibration = setup.evaluate(run, uncertainty=sd.ReadingUncertainty(distance=1e-4, tilt=1e-6))
+    calibration = setup.evaluate(run, uncertainty=sd.methods.ReadingUncertainty(distance=1e-4, tilt=1e-6))
     uncertainty = {name: u for name, (_, _, u) in calibration.functions.items()}
     uncertainty |= {name: np.array([u]) for name, (_, u) in calibration.squareness.items()}
     ratios = []

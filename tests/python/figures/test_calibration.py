@@ -95,7 +95,7 @@ def test_rejected_fit_is_marked_in_the_heading_and_in_every_panel(calibration: s
 def test_figures_say_for_which_temperature_they_are(temperature: dict[str, Any], words: str) -> None:
     calibration = sd.Calibration(**parts_of(calibrate(1)), **temperature)
     assert any(words in text for text in texts(calibration.plot()))
-    assert any(words in text for text in texts(sd.volume_errors(calibration, ranking=False).plot()))
+    assert any(words in text for text in texts(sd.volume(calibration, ranking=False).plot()))
 
 
 def test_undetermined_parameters_are_marked_and_named() -> None:

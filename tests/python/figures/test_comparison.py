@@ -14,7 +14,7 @@ import stepdiag as sd
 from stepdiag.calibration.comparison import Comparison
 from stepdiag.figures.comparison import draw_comparison
 from stepdiag.io.comparison_read import read_comparison
-from stepdiag.report.comparison import write_comparison
+from stepdiag.presentation.comparison import write_comparison
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def comparison() -> Comparison:
     parts = parts_of(calibrate(2))
     parts["functions"]["EXX"][1][3] += 5e-3
     del parts["functions"]["EZZ"]
-    return sd.compare_calibrations(calibrate(1), sd.Calibration(**parts))
+    return sd.compare(calibrate(1), sd.Calibration(**parts))
 
 
 def test_differences_bands_and_significance(comparison: Comparison) -> None:
@@ -59,7 +59,7 @@ def test_file_gives_the_same_differences(comparison: Comparison, name: str, tmp_
 def test_heading_says_for_which_temperature_both_are(name: str | None, tmp_path: Path) -> None:
     parts = parts_of(calibrate(2)) | {"date": ""}
     made = {"temperature_reference": 20.0}, {"temperature_as_found": (23.1, 23.0, 22.8)}
-    drawn = sd.compare_calibrations(*(sd.Calibration(**parts, **temperature) for temperature in made))
+    drawn = sd.compare(*(sd.Calibration(**parts, **temperature) for temperature in made))
     if name is not None:
         write_comparison(drawn, tmp_path / name)
         drawn = read_comparison(tmp_path / name)
@@ -98,5 +98,5 @@ def test_bad_files_are_refused(comparison: Comparison, old: str, new: str, messa
 
 def test_comparison_with_a_rejected_fit_is_marked() -> None:
     rejected = calibrate(2).judged("rejected")
-    assert "FIT REJECTED: DO NOT USE" in texts(sd.compare_calibrations(calibrate(1), rejected).plot())
-    assert "FIT REJECTED: DO NOT USE" not in texts(sd.compare_calibrations(calibrate(1), calibrate(2)).plot())
+    assert "FIT REJECTED: DO NOT USE" in texts(sd.compare(calibrate(1), rejected).plot())
+    assert "FIT REJECTED: DO NOT USE" not in texts(sd.compare(calibrate(1), calibrate(2)).plot())

@@ -13,7 +13,7 @@ import stepdiag as sd
 from stepdiag.figures.growth import draw_growth, read_steps
 from stepdiag.figures.uncertainty import draw_observation
 from stepdiag.planning.observation import Prospect, prospects
-from stepdiag.report.observation import prospect_csv
+from stepdiag.presentation.observation import prospect_csv
 
 # u = 0.1 µm √N, 0.2 µm, 1 µrad N; squarenesses are not determined.
 TABLE = [

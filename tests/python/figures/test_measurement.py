@@ -35,7 +35,7 @@ def marked(figure: Figure, what: str) -> set[tuple[int, str]]:
 
 
 def test_every_line_and_channel_has_ink_and_units(scenario: sd.Scenario) -> None:
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     figure = draw_measurement(run)
     found = ink(figure)
     assert found.keys() == {f"{line}  {channel}" for line in dict.fromkeys(run.line) for channel in run.channels}
@@ -69,8 +69,8 @@ def test_lost_readings_and_directions_are_shown() -> None:
 
 
 def test_residuals_are_those_of_the_adjustment(scenario: sd.Scenario) -> None:
-    run = sd.simulate_scenario(scenario)
-    found = sd.adjust_scenario(scenario, run)
+    run = sd.simulate(scenario)
+    found = sd.methods.adjust_scenario(scenario, run)
     figure = draw_measurement(run, found)
     for channel, factor in (("distance", 1e3), ("alpha", 1e6), ("beta", 1e6)):
         for line in dict.fromkeys(run.line):
@@ -81,10 +81,10 @@ def test_residuals_are_those_of_the_adjustment(scenario: sd.Scenario) -> None:
 
 
 def test_marked_outliers_and_slips_are_those_of_the_adjustment(scenario: sd.Scenario) -> None:
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     run = changed(run, "alpha", rows_of(run, "pnp")[[10]], 4e-5)
     run = changed(run, "distance", rows_of(run, "npp")[25:], 5e-3)
-    found = sd.adjust_scenario(scenario, run)
+    found = sd.methods.adjust_scenario(scenario, run)
     figure = draw_measurement(run, found)
     assert found.outliers
     assert marked(figure, "outlier") == {(o.row, o.channel) for o in found.outliers}
@@ -98,9 +98,9 @@ def test_marked_outliers_and_slips_are_those_of_the_adjustment(scenario: sd.Scen
 
 
 def test_gross_outlier_does_not_flatten_the_others(scenario: sd.Scenario) -> None:
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     run = changed(run, "alpha", rows_of(run, "pnp")[[10]], 1e-2)
-    found = sd.adjust_scenario(scenario, run)
+    found = sd.methods.adjust_scenario(scenario, run)
     figure = draw_measurement(run, found)
     largest = 1e6 * np.max(np.abs(found.residuals["alpha"][found.used["alpha"]]))
     low, high = panel(figure, "pnp  alpha").get_ylim()
@@ -109,18 +109,18 @@ def test_gross_outlier_does_not_flatten_the_others(scenario: sd.Scenario) -> Non
 
 
 def test_empty_sheet_and_foreign_adjustment_are_refused(scenario: sd.Scenario) -> None:
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     empty = changed(run, "distance", np.arange(len(run)), np.nan)
     empty = changed(empty, "alpha", np.arange(len(run)), np.nan)
     empty = changed(empty, "beta", np.arange(len(run)), np.nan)
     with pytest.raises(sd.InvalidArgument, match="with readings, got empty fields only"):
         draw_measurement(empty)
     with pytest.raises(sd.InvalidArgument, match="`adjustment`: expected that of this measurement of"):
-        draw_measurement(simulate(1), sd.adjust_scenario(scenario, run))
+        draw_measurement(simulate(1), sd.methods.adjust_scenario(scenario, run))
 
 
 def test_method_plot_draws_the_same(scenario: sd.Scenario) -> None:
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     assert texts(run.plot()) == texts(draw_measurement(run))
-    found = sd.adjust_scenario(scenario, run)
+    found = sd.methods.adjust_scenario(scenario, run)
     assert texts(run.plot(adjustment=found)) == texts(draw_measurement(run, found))

@@ -13,19 +13,21 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.figures.uncertainty import draw_observation, draw_uncertainty, read_drawn_uncertainty
 from stepdiag.parameters import FUNCTIONS
-from stepdiag.report.uncertainty import opening_rows
+from stepdiag.presentation.uncertainty import opening_rows
 from stepdiag.uncertainty.write import write_uncertainty
 
 UNCERTAIN = SCENARIO + "[uncertainty]\ndistance_um = 0.1\nscale_ppm = 0.5\nreflector_urad = 300.0\n"
 
 
 @pytest.fixture(scope="module")
-def result() -> sd.UncertaintyResult:
+def result() -> sd.montecarlo.UncertaintyResult:
     scenario = sd.parse_scenario(UNCERTAIN)
-    return sd.evaluate_uncertainty(scenario, sd.UncertaintyRequest(samples=10_000))
+    return sd.montecarlo.evaluate_uncertainty(scenario, sd.montecarlo.UncertaintyRequest(samples=10_000))
 
 
-def test_curves_are_standard_uncertainties_and_bars_are_shares_of_the_variance(result: sd.UncertaintyResult) -> None:
+def test_curves_are_standard_uncertainties_and_bars_are_shares_of_the_variance(
+    result: sd.montecarlo.UncertaintyResult,
+) -> None:
     figure = draw_uncertainty(result)
     assert all(count > 60 for count in ink(figure).values()), ink(figure)
     sampled, propagated = (np.asarray(x.standard_uncertainty) for x in (result.monte_carlo, result.propagation))
@@ -63,7 +65,7 @@ def test_heading_says_whether_positioning_is_as_found(
     tmp_path: Path, name: str | None, section: str, words: str
 ) -> None:
     known = sd.parse_scenario(UNCERTAIN + section)
-    result = sd.evaluate_uncertainty(known, sd.UncertaintyRequest())
+    result = sd.montecarlo.evaluate_uncertainty(known, sd.montecarlo.UncertaintyRequest())
     assert f"temperature: positioning errors are {words.removeprefix('positioning ')}" in list(opening_rows(result))
     if name is not None:
         write_uncertainty(result, tmp_path / name)
@@ -73,14 +75,14 @@ def test_heading_says_whether_positioning_is_as_found(
     assert any(text.endswith(words) for text in texts(draw_observation(run, found, known.known)))
 
 
-def test_file_gives_the_same_figure(result: sd.UncertaintyResult, tmp_path: Path) -> None:
+def test_file_gives_the_same_figure(result: sd.montecarlo.UncertaintyResult, tmp_path: Path) -> None:
     write_uncertainty(result, tmp_path / "u.nc")
     assert texts(draw_uncertainty(read_drawn_uncertainty(tmp_path / "u.nc"))) == texts(draw_uncertainty(result))
     assert texts(result.plot()) == texts(draw_uncertainty(result))
 
 
 def test_csv_file_gives_the_same_curves_and_says_where_the_budget_is(
-    result: sd.UncertaintyResult, tmp_path: Path
+    result: sd.montecarlo.UncertaintyResult, tmp_path: Path
 ) -> None:
     write_uncertainty(result, tmp_path / "u.csv")
     figure, whole = draw_uncertainty(read_drawn_uncertainty(tmp_path / "u.csv")), draw_uncertainty(result)
@@ -93,8 +95,8 @@ def test_csv_file_gives_the_same_curves_and_says_where_the_budget_is(
 
 
 def test_csv_file_of_the_propagation_alone_is_drawn(tmp_path: Path) -> None:
-    result = sd.evaluate_uncertainty(
-        sd.parse_scenario(UNCERTAIN), sd.UncertaintyRequest(points=(((1.0, 2.0, 3.0), None),))
+    result = sd.montecarlo.evaluate_uncertainty(
+        sd.parse_scenario(UNCERTAIN), sd.montecarlo.UncertaintyRequest(points=(((1.0, 2.0, 3.0), None),))
     )
     write_uncertainty(result, tmp_path / "u.csv")
     drawn = read_drawn_uncertainty(tmp_path / "u.csv")
@@ -123,7 +125,9 @@ def test_csv_file_of_the_propagation_alone_is_drawn(tmp_path: Path) -> None:
 )
 def test_damaged_csv_files_are_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / "u.csv"
-    write_uncertainty(sd.evaluate_uncertainty(sd.parse_scenario(UNCERTAIN), sd.UncertaintyRequest()), path)
+    write_uncertainty(
+        sd.montecarlo.evaluate_uncertainty(sd.parse_scenario(UNCERTAIN), sd.montecarlo.UncertaintyRequest()), path
+    )
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))

@@ -12,7 +12,7 @@ import stepdiag as sd
 
 def test_planes_show_the_exact_errors_through_the_worst_point() -> None:
     calibration = calibrate(1)
-    found = sd.volume_errors(calibration, ranking=False)
+    found = sd.volume(calibration, ranking=False)
     figure = found.plot()
     assert min(ink(figure).values()) > 1000
     assert {"position X (mm)", "position Y (mm)", "position Z (mm)", "length of the error (µm)"} == set(labels(figure))
@@ -31,6 +31,6 @@ def test_planes_show_the_exact_errors_through_the_worst_point() -> None:
 def test_unknown_error_is_not_drawn() -> None:
     parts = parts_of(calibrate(1))
     del parts["functions"]["EXX"]
-    found = sd.volume_errors(sd.Calibration(**parts), ranking=False)
+    found = sd.volume(sd.Calibration(**parts), ranking=False)
     with pytest.raises(sd.InvalidArgument, match="the error in the volume is not known: EXX are not determined"):
         found.plot()

@@ -14,7 +14,7 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.head.description import find_head, parse_head_design, read_head_design
-from stepdiag.report.file_check import examine
+from stepdiag.presentation.file_check import examine
 from stepdiag.scenario.description import parse_scenario
 
 PSD = find_head("beam_and_psd").read_text(encoding="utf-8")
@@ -209,7 +209,7 @@ def test_pose_error_that_pushes_a_component_into_another_is_refused(tmp_path: Pa
     said = (
         "s.toml: head: splitter and psd: overlap or touch, with their pose errors; expected a gap of at least 0.01 mm"
     )
-    for call in (lambda: sd.simulate_scenario(scenario), lambda: examine(file)):
+    for call in (lambda: sd.simulate(scenario), lambda: examine(file)):
         with pytest.raises(sd.InvalidArgument, match=re.escape(said)):
             call()
 

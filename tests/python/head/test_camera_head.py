@@ -29,11 +29,11 @@ def test_spots_scatter_as_the_bound_says_about_those_of_the_position_sensing_dev
     misalignment = {"ppp": sd.Misalignment(reflector=(300e-6, -200e-6))}  # spots move over the chip by 0.3 mm
     machine = sd.Machine("[w X' b Y Z t]")
     camera, exact = (
-        sd.simulate(machine, plan, sd.Head.from_design(sd.shipped_head(name)), misalignment=misalignment)
+        sd.simulate(machine, plan, sd.Head.from_design(sd.optics.shipped_head(name)), misalignment=misalignment)
         for name in ("beam_and_camera", "beam_and_psd")
     )
     sensor = description("beam_and_camera")["sensor"]["camera"]
-    pixels = sd.Camera(
+    pixels = sd.optics.Camera(
         pixel=sensor["pixel_um"] * 1e-3,
         **{key: sensor[key] for key in ("columns", "rows", "electrons", "background", "read_noise", "shot_noise")},
         **{key: sensor[key] for key in ("full_well", "bits", "centroid")},
@@ -44,7 +44,7 @@ def test_spots_scatter_as_the_bound_says_about_those_of_the_position_sensing_dev
         # From laser to mirror and chip in air: 80 mm besides twice the distance, of which 50 mm are glass.
         way = 2.0 * distance + 80.0 - 50.0 * (1.0 - 1.0 / 1.515)
         radius = 0.5 * math.hypot(1.0, (way - 600.0) / (math.pi * 0.5**2 / 635e-6))
-        bound = sd.cramer_rao_bound(pixels, sd.BeamSpot((0.0, 0.0), radius, 0.25))
+        bound = sd.optics.cramer_rao_bound(pixels, sd.optics.BeamSpot((0.0, 0.0), radius, 0.25))
         errors += [(camera.channels[name][i] - exact.channels[name][i]) / bound for name in ("spot_x", "spot_y")]
     # Four standard deviations of the scatter and of the mean of 62 normal numbers.
     assert abs(np.std(errors) - 1.0) < 4.0 / math.sqrt(2 * len(errors))
@@ -56,11 +56,11 @@ def test_a_calibration_with_the_camera_is_as_good_as_its_noise() -> None:
     errors = sd.random_error_map(volume, seed=3)
     machine = sd.Machine("[w X' b Y Z t]", errors)
     plan = sd.Plan(volume, ["ppp", "npp", "pnp", "nnp"], 4, scale_lines=["p00", "0p0", "00p"])
-    head = sd.Head.from_design(sd.shipped_head("beam_and_camera"))
+    head = sd.Head.from_design(sd.optics.shipped_head("beam_and_camera"))
     run = sd.simulate(machine, plan, head)
     spot = 60e-6  # mm; the bound is 20 to 60 nm at these distances
-    weights = sd.ReadingUncertainty(distance=1e-6, spot=spot)
-    calibration = sd.evaluate(run, plan, head, machine.chain, uncertainty=weights)
-    agreement = sd.compare_calibrations(calibration, errors).agreement
+    weights = sd.methods.ReadingUncertainty(distance=1e-6, spot=spot)
+    calibration = sd.methods.evaluate(run, plan, head, machine.chain, uncertainty=weights)
+    agreement = sd.compare(calibration, errors).agreement
     assert agreement is not None
     assert agreement.rms < 1.5  # deviation by stated uncertainty; less, as most spots scatter less than stated

@@ -17,25 +17,27 @@ from scipy import integrate, stats
 import stepdiag as sd
 
 NAN, INF = float("nan"), float("inf")
-MODE = sd.GaussianMode(1530.0, 0.8)
-SPOT = sd.BeamSpot((0.0, 0.0), 0.05)
+MODE = sd.optics.GaussianMode(1530.0, 0.8)
+SPOT = sd.optics.BeamSpot((0.0, 0.0), 0.05)
 
 
-def returned(x: float, y: float, angle_x: float, angle_y: float, optical: float, reduced: float) -> sd.ReturnedBeam:
-    return sd.ReturnedBeam((x, y), (angle_x, angle_y, -math.sqrt(1 - angle_x**2 - angle_y**2)), optical, reduced)
+def returned(
+    x: float, y: float, angle_x: float, angle_y: float, optical: float, reduced: float
+) -> sd.optics.ReturnedBeam:
+    return sd.optics.ReturnedBeam((x, y), (angle_x, angle_y, -math.sqrt(1 - angle_x**2 - angle_y**2)), optical, reduced)
 
 
-def from_mirror(length: float, phi: float) -> sd.ReturnedBeam:
+def from_mirror(length: float, phi: float) -> sd.optics.ReturnedBeam:
     """A mirror in vacuum, turned about the point where the axis meets it."""
     path = length + length / math.cos(2 * phi)
     direction = (math.sin(2 * phi), 0.0, -math.cos(2 * phi))
-    return sd.ReturnedBeam((length * math.tan(2 * phi), 0.0), direction, path, path)
+    return sd.optics.ReturnedBeam((length * math.tan(2 * phi), 0.0), direction, path, path)
 
 
 # --- interferometer ---
 
 
-def overlap_1d(mode: sd.GaussianMode, d: float, s: float, reduced: float) -> mp.mpc:
+def overlap_1d(mode: sd.optics.GaussianMode, d: float, s: float, reduced: float) -> mp.mpc:
     """One dimension of the overlap integral with fields of complex parameter q, to 25 digits."""
     k = 2 * mp.pi / (mp.mpf(mode.wavelength) * mp.mpf("1e-6"))
     q0 = mp.mpc(-mode.waist_position, k * mp.mpf(mode.waist_radius) ** 2 / 2)
@@ -55,11 +57,13 @@ def test_coupling_is_the_overlap_integral() -> None:
     random = np.random.default_rng(1)
     with mp.workdps(25):
         for _ in range(4):
-            mode = sd.GaussianMode(random.uniform(600, 1600), random.uniform(0.5, 1.2), random.uniform(-800, 800))
+            mode = sd.optics.GaussianMode(
+                random.uniform(600, 1600), random.uniform(0.5, 1.2), random.uniform(-800, 800)
+            )
             x, y = random.uniform(-1, 1, 2)
             angles = random.uniform(-4e-4, 4e-4, 2)
             reduced, index = random.uniform(100, 2500), random.uniform(1, 1.3)
-            length, efficiency = sd.couple(mode, returned(x, y, *angles, 0.0, reduced), index)
+            length, efficiency = sd.optics.couple(mode, returned(x, y, *angles, 0.0, reduced), index)
             exact = overlap_1d(mode, x, index * angles[0], reduced) * overlap_1d(mode, y, index * angles[1], reduced)
             aligned = overlap_1d(mode, 0, 0, reduced) ** 2
             assert abs(efficiency - float(abs(exact) ** 2)) < 1e-13  # roundings of exp(-20) and the like
@@ -69,14 +73,16 @@ def test_coupling_is_the_overlap_integral() -> None:
 
 @pytest.mark.parametrize("phi", [50e-6, 300e-6, 600e-6])
 def test_turned_mirror_reads_the_second_order_of_each_model(phi: float) -> None:
-    chief = sd.read_distance(sd.Interferometer(), MODE, from_mirror(1200.0, phi))
-    coupled = sd.read_distance(sd.Interferometer(reading_model="coupled_mode"), MODE, from_mirror(1200.0, phi))
+    chief = sd.optics.read_distance(sd.optics.Interferometer(), MODE, from_mirror(1200.0, phi))
+    coupled = sd.optics.read_distance(
+        sd.optics.Interferometer(reading_model="coupled_mode"), MODE, from_mirror(1200.0, phi)
+    )
     assert chief == pytest.approx(1200 + 1200 * phi**2, abs=1e-9)  # fourth order: 1200 * (6e-4)^4 = 2e-10
     assert coupled == pytest.approx(1200 - 1200 * phi**2 / 2, abs=1e-9)
 
 
 def test_tilt_of_300_urad_at_1200_mm_leaves_a_fifth_of_the_light() -> None:
-    aligned, at_300, at_600 = (sd.couple(MODE, from_mirror(1200.0, phi))[1] for phi in (0.0, 300e-6, 600e-6))
+    aligned, at_300, at_600 = (sd.optics.couple(MODE, from_mirror(1200.0, phi))[1] for phi in (0.0, 300e-6, 600e-6))
     assert aligned == pytest.approx(1 / (1 + (1200 / MODE.rayleigh_length) ** 2), rel=1e-14)  # 54.5 %: the beam grew
     assert at_300 / aligned == pytest.approx(0.3786, abs=1e-4)
     assert at_300 == pytest.approx(0.2064, abs=1e-4)
@@ -84,34 +90,34 @@ def test_tilt_of_300_urad_at_1200_mm_leaves_a_fifth_of_the_light() -> None:
 
 
 def test_reading_reduces_by_the_assumed_index() -> None:
-    beam = sd.ReturnedBeam((0, 0), (0, 0, -1), 2 * 1000 * 1.00027, 2000 / 1.00027)
-    interferometer = sd.Interferometer(dead_path=150.0, index_error=0.5e-6)
+    beam = sd.optics.ReturnedBeam((0, 0), (0, 0, -1), 2 * 1000 * 1.00027, 2000 / 1.00027)
+    interferometer = sd.optics.Interferometer(dead_path=150.0, index_error=0.5e-6)
     used = 1.00026 * (1 + 0.5e-6)
     expected = 1000 * 1.00027 / used + 150 * (1.00027 / used - 1)
-    assert sd.read_distance(interferometer, MODE, beam, true_index=1.00027, assumed_index=1.00026) == pytest.approx(
-        expected, abs=1e-12
-    )  # roundings of 1000 mm
+    assert sd.optics.read_distance(
+        interferometer, MODE, beam, true_index=1.00027, assumed_index=1.00026
+    ) == pytest.approx(expected, abs=1e-12)  # roundings of 1000 mm
 
 
 def test_beam_outside_the_aperture_is_a_lost_reading() -> None:
-    assert sd.read_distance(sd.Interferometer(aperture=2.0), MODE, from_mirror(1200.0, 500e-6)) is None
-    weak = sd.Interferometer(reading_model="coupled_mode", least_coupling=0.1)
-    assert sd.read_distance(weak, MODE, from_mirror(1200.0, 300e-6)) is not None
-    assert sd.read_distance(weak, MODE, from_mirror(1200.0, 600e-6)) is None
+    assert sd.optics.read_distance(sd.optics.Interferometer(aperture=2.0), MODE, from_mirror(1200.0, 500e-6)) is None
+    weak = sd.optics.Interferometer(reading_model="coupled_mode", least_coupling=0.1)
+    assert sd.optics.read_distance(weak, MODE, from_mirror(1200.0, 300e-6)) is not None
+    assert sd.optics.read_distance(weak, MODE, from_mirror(1200.0, 600e-6)) is None
 
 
 # --- spot ---
 
 
-def irradiance(y: float, x: float, spot: sd.BeamSpot) -> float:
+def irradiance(y: float, x: float, spot: sd.optics.BeamSpot) -> float:
     r2 = (x - spot.centre[0]) ** 2 + (y - spot.centre[1]) ** 2
     return float(2 / (math.pi * spot.radius**2) * math.exp(-2 * r2 / spot.radius**2))
 
 
 def test_pixels_are_double_integrals_of_the_irradiance() -> None:
-    spot = sd.BeamSpot((0.0123, -0.0045), 0.031, 0.7)
-    camera = sd.Camera(columns=24, rows=20, electrons=1e5)
-    image = sd.expose(camera, [spot])
+    spot = sd.optics.BeamSpot((0.0123, -0.0045), 0.031, 0.7)
+    camera = sd.optics.Camera(columns=24, rows=20, electrons=1e5)
+    image = sd.optics.expose(camera, [spot])
     assert image.shape == (20, 24)
     for row, column in [(9, 13), (10, 12), (3, 20), (12, 9)]:
         low, high = np.array([column - 12, row - 10]) * 0.01, np.array([column - 11, row - 9]) * 0.01
@@ -119,53 +125,53 @@ def test_pixels_are_double_integrals_of_the_irradiance() -> None:
             irradiance, low[0], high[0], low[1], high[1], args=(spot,), epsabs=1e-15, epsrel=1e-13
         )
         assert image[row, column] / 1e5 == pytest.approx(0.7 * exact, rel=1e-11)  # quadrature
-        assert sd.power_inside(spot, low, high) == pytest.approx(0.7 * exact, rel=1e-11)
-    whole = sd.power_inside(spot, (-0.12, -0.1), (0.12, 0.1))
+        assert sd.optics.power_inside(spot, low, high) == pytest.approx(0.7 * exact, rel=1e-11)
+    whole = sd.optics.power_inside(spot, (-0.12, -0.1), (0.12, 0.1))
     assert image.sum() / 1e5 == pytest.approx(whole, rel=1e-14)
 
 
 def test_far_tails_keep_their_relative_precision() -> None:
-    spot = sd.BeamSpot((0.0, 0.0), 0.5)
+    spot = sd.optics.BeamSpot((0.0, 0.0), 0.5)
     with mp.workdps(40):
         for edge in (1.0, 3.0, 6.0):
             exact = mp.erfc(mp.sqrt(2) * edge / mp.mpf("0.5")) / 2
-            assert sd.power_inside(spot, (edge, -50), (50, 50)) == pytest.approx(float(exact), rel=1e-13)
+            assert sd.optics.power_inside(spot, (edge, -50), (50, 50)) == pytest.approx(float(exact), rel=1e-13)
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (1.7, -0.4), (-2.3, 1.6)])
 def test_position_device_reads_the_centroid_of_what_falls_on_it(centre: tuple[float, float]) -> None:
-    device, ghost = sd.LateralEffect(size=(4.0, 3.0)), sd.BeamSpot((-0.5, 0.7), 0.9, 0.05)
+    device, ghost = sd.optics.LateralEffect(size=(4.0, 3.0)), sd.optics.BeamSpot((-0.5, 0.7), 0.9, 0.05)
     total = np.zeros(3)
-    for spot in (sd.BeamSpot(centre, 0.6, 0.8), ghost):
+    for spot in (sd.optics.BeamSpot(centre, 0.6, 0.8), ghost):
         normal = [stats.norm(c, spot.radius / 2) for c in spot.centre]
         power = [n.expect(lambda _: 1.0, lb=-half, ub=half) for n, half in zip(normal, (2.0, 1.5), strict=True)]
         mean = [n.expect(lambda t: t, lb=-half, ub=half) for n, half in zip(normal, (2.0, 1.5), strict=True)]
         total += spot.power * np.array([power[0] * power[1], mean[0] * power[1], mean[1] * power[0]])
-    position = sd.locate(device, [sd.BeamSpot(centre, 0.6, 0.8), ghost])
+    position = sd.optics.locate(device, [sd.optics.BeamSpot(centre, 0.6, 0.8), ghost])
     assert position == pytest.approx(total[1:] / total[0], abs=1e-8)  # quadrature's tolerance
 
 
 def test_noise_depends_on_seed_and_counter_alone() -> None:
-    camera = sd.Camera(columns=40, rows=30, shot_noise=True, read_noise=2.0, background=10.0)
-    images = [sd.expose(camera, [SPOT], seed=5, counter=i) for i in range(8)]
+    camera = sd.optics.Camera(columns=40, rows=30, shot_noise=True, read_noise=2.0, background=10.0)
+    images = [sd.optics.expose(camera, [SPOT], seed=5, counter=i) for i in range(8)]
     with ThreadPoolExecutor(4) as pool:
-        again = list(pool.map(lambda i: sd.expose(camera, [SPOT], seed=5, counter=i), reversed(range(8))))
+        again = list(pool.map(lambda i: sd.optics.expose(camera, [SPOT], seed=5, counter=i), reversed(range(8))))
     for first, second in zip(images, reversed(again), strict=True):
         np.testing.assert_array_equal(first, second)
     assert not np.array_equal(images[0], images[1])
-    assert not np.array_equal(images[0], sd.expose(camera, [SPOT], seed=6, counter=0))
-    device = sd.LateralEffect(noise=1e-3)
-    np.testing.assert_array_equal(*(sd.locate(device, [SPOT], seed=2**64 - 1, counter=7) for _ in range(2)))
-    assert not np.array_equal(sd.locate(device, [SPOT], seed=1), sd.locate(device, [SPOT], seed=2))
+    assert not np.array_equal(images[0], sd.optics.expose(camera, [SPOT], seed=6, counter=0))
+    device = sd.optics.LateralEffect(noise=1e-3)
+    np.testing.assert_array_equal(*(sd.optics.locate(device, [SPOT], seed=2**64 - 1, counter=7) for _ in range(2)))
+    assert not np.array_equal(sd.optics.locate(device, [SPOT], seed=1), sd.optics.locate(device, [SPOT], seed=2))
 
 
 # --- centroid ---
 
 
-def camera_for(radius: float, electrons: float, **options: Any) -> sd.Camera:
+def camera_for(radius: float, electrons: float, **options: Any) -> sd.optics.Camera:
     """Large enough that a spot near the middle loses no light."""
     size = int(6 * radius) + 16
-    return sd.Camera(columns=size, rows=size, electrons=electrons, **options)
+    return sd.optics.Camera(columns=size, rows=size, electrons=electrons, **options)
 
 
 def information(mean: float, read_noise: float) -> float:
@@ -185,7 +191,9 @@ def information(mean: float, read_noise: float) -> float:
 @pytest.mark.parametrize("read_noise", [0.0, 0.4, 1.5])
 def test_cramer_rao_bound_is_the_inverse_of_the_information(read_noise: float) -> None:
     """Fisher information from mpmath's derivatives of the pixels' means, 5 x 5, inverted at 30 digits."""
-    camera = sd.Camera(columns=14, rows=12, electrons=400.0, background=0.3, read_noise=read_noise, shot_noise=True)
+    camera = sd.optics.Camera(
+        columns=14, rows=12, electrons=400.0, background=0.3, read_noise=read_noise, shot_noise=True
+    )
     with mp.workdps(30):
         truth = [mp.mpf(v) for v in ("0.0031", "-0.0042", "0.027", "400", "0.3")]
         step = mp.mpf("0.01")
@@ -210,7 +218,7 @@ def test_cramer_rao_bound_is_the_inverse_of_the_information(read_noise: float) -
             for j in range(5):
                 total[i, j] = (by[i] * by[j] * weight).sum()
         exact = mp.sqrt((total**-1)[0, 0])
-    bound = sd.cramer_rao_bound(camera, sd.BeamSpot((0.0031, -0.0042), 0.027))
+    bound = sd.optics.cramer_rao_bound(camera, sd.optics.BeamSpot((0.0031, -0.0042), 0.027))
     # A pixel's information is interpolated between 16 means a decade: 1e-4. Without read noise the limit is rounding.
     assert bound == pytest.approx(float(exact), rel=1e-4 if read_noise else 1e-8)
 
@@ -225,9 +233,9 @@ def test_gaussian_fit_is_within_a_tenth_of_the_cramer_rao_bound(
     camera, images = camera_for(radius, electrons, shot_noise=True, read_noise=read_noise), 400
     errors = np.empty((images, 2))
     for i in range(images):
-        spot = sd.BeamSpot((0.0013 * (i % 4), 0.0049 - 0.0023 * (i % 4)), 0.01 * radius)
-        errors[i] = sd.locate(camera, sd.expose(camera, [spot], seed=3, counter=i)) - spot.centre
-    bound = sd.cramer_rao_bound(camera, sd.BeamSpot((0.0013, 0.0026), 0.01 * radius))
+        spot = sd.optics.BeamSpot((0.0013 * (i % 4), 0.0049 - 0.0023 * (i % 4)), 0.01 * radius)
+        errors[i] = sd.optics.locate(camera, sd.optics.expose(camera, [spot], seed=3, counter=i)) - spot.centre
+    bound = sd.optics.cramer_rao_bound(camera, sd.optics.BeamSpot((0.0013, 0.0026), 0.01 * radius))
     assert 0.9 < math.sqrt(np.mean(errors**2)) / bound < 1.1
     # The mean's own noise, four of its deviations, is allowed beside the 0.01 pixel.
     assert np.abs(errors.mean(axis=0)).max() < 0.01 * camera.pixel + 4 * bound / math.sqrt(images)
@@ -239,51 +247,53 @@ def test_centroid_has_no_bias_away_from_the_edge(centroid: str, radius: float) -
     camera = camera_for(radius, 1e5, shot_noise=True, read_noise=1.5, background=5.0, centroid=centroid)
     quiet = camera_for(radius, 1e5, background=5.0)
     for x, y in np.random.default_rng(4).uniform(-0.005, 0.005, (40, 2)):
-        expectation = sd.expose(quiet, [sd.BeamSpot((x, y), 0.01 * radius)])
-        bias = np.abs(sd.locate(camera, expectation) - (x, y)).max() / camera.pixel
+        expectation = sd.optics.expose(quiet, [sd.optics.BeamSpot((x, y), 0.01 * radius)])
+        bias = np.abs(sd.optics.locate(camera, expectation) - (x, y)).max() / camera.pixel
         assert bias < (1e-5 if centroid == "gaussian_fit" else 0.01)  # the fit's stops short of its last step
 
 
 def test_nothing_is_located_where_there_is_no_spot() -> None:
     for centroid in ("gaussian_fit", "centre_of_gravity"):
-        camera = sd.Camera(columns=64, rows=64, read_noise=2.0, background=10.0, shot_noise=True, centroid=centroid)
-        assert sd.locate(camera, sd.expose(camera, [], seed=1)) is None
-    assert sd.locate(sd.LateralEffect(), [sd.BeamSpot((30.0, 0.0), 0.5)]) is None
+        camera = sd.optics.Camera(
+            columns=64, rows=64, read_noise=2.0, background=10.0, shot_noise=True, centroid=centroid
+        )
+        assert sd.optics.locate(camera, sd.optics.expose(camera, [], seed=1)) is None
+    assert sd.optics.locate(sd.optics.LateralEffect(), [sd.optics.BeamSpot((30.0, 0.0), 0.5)]) is None
 
 
 # --- bad input ---
 
 BAD: list[tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]] = [
-    (sd.GaussianMode, (0.0, 0.8), {}, "wavelength"),
-    (sd.GaussianMode, (1530.0, NAN), {}, "waist_radius"),
-    (sd.GaussianMode, (1530.0, 0.8, INF), {}, "waist_position"),
-    (sd.ReturnedBeam, ((0, 0, 0), (0, 0, -1), 1.0, 1.0), {}, "position"),
-    (sd.ReturnedBeam, ((0, NAN), (0, 0, -1), 1.0, 1.0), {}, "position"),
-    (sd.ReturnedBeam, ((0, 0), (0, 0, 1), 1.0, 1.0), {}, "direction"),
-    (sd.ReturnedBeam, ((0, 0), (0, 0.1, -1), 1.0, 1.0), {}, "direction"),
-    (sd.ReturnedBeam, ((0, 0), (0, 0, -1), INF, 1.0), {}, "optical_length"),
-    (sd.ReturnedBeam, ((0, 0), (0, 0, -1), 1.0, NAN), {}, "reduced_length"),
-    (sd.couple, (MODE, from_mirror(10.0, 0.0), 0.0), {}, "index"),
-    (sd.read_distance, (sd.Interferometer(), MODE, from_mirror(10.0, 0.0)), {"true_index": NAN}, "true_index"),
-    (sd.read_distance, (sd.Interferometer(), MODE, from_mirror(10.0, 0.0)), {"assumed_index": -1}, "assumed_index"),
-    *((sd.Interferometer, (), {key: bad}, f"interferometer {key}") for key, bad in [
+    (sd.optics.GaussianMode, (0.0, 0.8), {}, "wavelength"),
+    (sd.optics.GaussianMode, (1530.0, NAN), {}, "waist_radius"),
+    (sd.optics.GaussianMode, (1530.0, 0.8, INF), {}, "waist_position"),
+    (sd.optics.ReturnedBeam, ((0, 0, 0), (0, 0, -1), 1.0, 1.0), {}, "position"),
+    (sd.optics.ReturnedBeam, ((0, NAN), (0, 0, -1), 1.0, 1.0), {}, "position"),
+    (sd.optics.ReturnedBeam, ((0, 0), (0, 0, 1), 1.0, 1.0), {}, "direction"),
+    (sd.optics.ReturnedBeam, ((0, 0), (0, 0.1, -1), 1.0, 1.0), {}, "direction"),
+    (sd.optics.ReturnedBeam, ((0, 0), (0, 0, -1), INF, 1.0), {}, "optical_length"),
+    (sd.optics.ReturnedBeam, ((0, 0), (0, 0, -1), 1.0, NAN), {}, "reduced_length"),
+    (sd.optics.couple, (MODE, from_mirror(10.0, 0.0), 0.0), {}, "index"),
+    (sd.optics.read_distance, (sd.optics.Interferometer(), MODE, from_mirror(10.0, 0.0)), {"true_index": NAN}, "true_index"),
+    (sd.optics.read_distance, (sd.optics.Interferometer(), MODE, from_mirror(10.0, 0.0)), {"assumed_index": -1}, "assumed_index"),
+    *((sd.optics.Interferometer, (), {key: bad}, f"interferometer {key}") for key, bad in [
         ("aperture", 0.0), ("acceptance", -1.0), ("least_coupling", 2.0), ("resolution", -1e-9),
         ("periodic_amplitude", NAN), ("dead_path", INF), ("index_error", 0.5)]),
-    (sd.Interferometer, (), {"reading_model": "fibre"}, "reading_model"),
-    (sd.BeamSpot, ((0, INF), 0.1), {}, "spot centre"),
-    (sd.BeamSpot, ((0, 0), 0.0), {}, "spot radius"),
-    (sd.BeamSpot, ((0, 0), 0.1, -0.1), {}, "spot power"),
-    *((sd.Camera, (), {key: bad}, key) for key, bad in [
+    (sd.optics.Interferometer, (), {"reading_model": "fibre"}, "reading_model"),
+    (sd.optics.BeamSpot, ((0, INF), 0.1), {}, "spot centre"),
+    (sd.optics.BeamSpot, ((0, 0), 0.0), {}, "spot radius"),
+    (sd.optics.BeamSpot, ((0, 0), 0.1, -0.1), {}, "spot power"),
+    *((sd.optics.Camera, (), {key: bad}, key) for key, bad in [
         ("pixel", 0.0), ("columns", 2), ("rows", 2**40), ("electrons", NAN), ("background", -1.0),
         ("read_noise", -1.0), ("full_well", 0.0), ("bits", 64), ("centroid", "mean"), ("threshold", 1.0)]),
-    *((sd.LateralEffect, (), {key: bad}, key) for key, bad in [
+    *((sd.optics.LateralEffect, (), {key: bad}, key) for key, bad in [
         ("size", (0.0, 1.0)), ("noise", -1.0), ("resolution", NAN), ("least_power", 0.0)]),
-    (sd.expose, (sd.Camera(), [SPOT]), {"seed": -1}, "seed"),
-    (sd.expose, (sd.Camera(), [SPOT]), {"counter": -1}, "counter"),
-    (sd.locate, (sd.Camera(), np.zeros((3, 3))), {}, "image"),
-    (sd.locate, (sd.Camera(), np.zeros(5)), {}, "image"),
-    (sd.locate, (sd.Camera(), "dark"), {}, "image"),
-    (sd.locate, (sd.Camera(columns=4, rows=4), np.full((4, 4), NAN)), {}, "image"),
+    (sd.optics.expose, (sd.optics.Camera(), [SPOT]), {"seed": -1}, "seed"),
+    (sd.optics.expose, (sd.optics.Camera(), [SPOT]), {"counter": -1}, "counter"),
+    (sd.optics.locate, (sd.optics.Camera(), np.zeros((3, 3))), {}, "image"),
+    (sd.optics.locate, (sd.optics.Camera(), np.zeros(5)), {}, "image"),
+    (sd.optics.locate, (sd.optics.Camera(), "dark"), {}, "image"),
+    (sd.optics.locate, (sd.optics.Camera(columns=4, rows=4), np.full((4, 4), NAN)), {}, "image"),
 ]  # fmt: skip
 
 

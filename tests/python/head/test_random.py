@@ -48,14 +48,14 @@ def test_beams_through_wedge_and_plate_hold_against_forty_digits(
     plate = {"width": 150.0, "height": 150.0, "thickness": 5.0}
     offsets = [(0.0, 0.0), (45.0, 0.0), (0.0, 45.0)]
     beams = [
-        sd.HeadBeam.interferometer(f"beam {i}", position=(u, v, 0.0), rotation=beam_turn, aperture=40.0)
+        sd.optics.HeadBeam.interferometer(f"beam {i}", position=(u, v, 0.0), rotation=beam_turn, aperture=40.0)
         for i, (u, v) in enumerate(offsets)
     ]
     bodies = [
-        sd.HeadBody.wedge("wedge", **wedge, material=index, position=(20.0, 20.0, 40.0), rotation=wedge_turn),
-        sd.HeadBody.plate("plate", **plate, material=other, position=(20.0, 20.0, 110.0), rotation=plate_turn),
+        sd.optics.HeadBody.wedge("wedge", **wedge, material=index, position=(20.0, 20.0, 40.0), rotation=wedge_turn),
+        sd.optics.HeadBody.plate("plate", **plate, material=other, position=(20.0, 20.0, 110.0), rotation=plate_turn),
     ]
-    head = sd.Head.from_design(sd.HeadDesign("odd", "multi_beam", bodies, beams), standoff=170.0)
+    head = sd.Head.from_design(sd.optics.HeadDesign("odd", "multi_beam", bodies, beams), standoff=170.0)
     signals = read(head, distance=distance, tilt=tilt, environment=AIR)
     aligned = read(head, distance=170.0, environment=AIR)
     assume(not np.isnan([signals, aligned]).any())
@@ -94,7 +94,7 @@ def test_shipped_heads_far_out_of_place_hold_against_forty_digits(
         name: (tuple(random.uniform(-0.3, 0.3, 3)), tuple(random.uniform(-2e-3, 2e-3, 3)))
         for name in read_description(path, shipped.routes).components
     }
-    design = sd.shipped_head(shipped.file)
+    design = sd.optics.shipped_head(shipped.file)
     displaced, sound = sd.Head.from_design(design, pose_errors=errors), sd.Head.from_design(design)
     signals = read(displaced, distance=distance, tilt=tilt, environment=AIR)
     reference = read(sound, distance=distance, environment=AIR)
@@ -115,23 +115,27 @@ def test_shipped_heads_far_out_of_place_hold_against_forty_digits(
 
 
 def coated(reflectance: float, absorptance: float = 0.0) -> sd.Head:
-    window = sd.HeadBody.plate(
+    window = sd.optics.HeadBody.plate(
         "window", width=40, height=80, thickness=5, material=1.5, position=(0, 0, 60), reflectance=reflectance
     )
-    cube = sd.HeadBody.cube_splitter(
+    cube = sd.optics.HeadBody.cube_splitter(
         "cube", edge=20.0, material=1.5, reflectance=0.4, absorptance=absorptance, position=(0, -16, 20)
     )
-    device = sd.SpotSensor.lateral_effect("psd", position=(-20, -16, 20), rotation=(0, -math.pi / 2, 0), size=(12, 12))
+    device = sd.optics.SpotSensor.lateral_effect(
+        "psd", position=(-20, -16, 20), rotation=(0, -math.pi / 2, 0), size=(12, 12)
+    )
     beams = [
-        sd.HeadBeam.interferometer("distance", position=(0.0, 0.0, 0.0)),
-        sd.HeadBeam.spot("laser", sensor="psd", position=(0.0, -16.0, -5.0)),
+        sd.optics.HeadBeam.interferometer("distance", position=(0.0, 0.0, 0.0)),
+        sd.optics.HeadBeam.spot("laser", sensor="psd", position=(0.0, -16.0, -5.0)),
     ]
-    return sd.Head.from_design(sd.HeadDesign("coated", "psd", [window, cube], beams, [device], least_power=1e-15))
+    return sd.Head.from_design(
+        sd.optics.HeadDesign("coated", "psd", [window, cube], beams, [device], least_power=1e-15)
+    )
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.0025, 0.04])
 def test_powers_at_the_detectors_are_products_of_shares(reflectance: float) -> None:
-    segments = sd.trace_beams(coated(reflectance, 0.1), distance=500.0, tilt=(1e-4, 2e-4))
+    segments = sd.optics.trace_beams(coated(reflectance, 0.1), distance=500.0, tilt=(1e-4, 2e-4))
     arrived = sorted((s.power for s in segments if s.arrives == "psd"), reverse=True)
     through, share = (1 - reflectance) ** 4, 0.5 * 0.4  # goes on at the cube, is sent aside on its return
     # Before the mirror the window's two faces send back what a device sees as straylight, the brighter one.
@@ -144,7 +148,7 @@ def test_powers_at_the_detectors_are_products_of_shares(reflectance: float) -> N
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.0025, 0.04])
 def test_power_of_all_leaves_is_that_of_the_source(reflectance: float) -> None:
-    segments = sd.trace_beams(coated(reflectance), distance=500.0, tilt=(1e-4, 2e-4))
+    segments = sd.optics.trace_beams(coated(reflectance), distance=500.0, tilt=(1e-4, 2e-4))
     for beam in ("distance", "laser"):
         leaves = [s.power for s in segments if s.beam == beam and s.fate != "goes_on"]
         assert abs(math.fsum(leaves) - 1.0) <= 1e-12  # some hundred products of shares

@@ -26,11 +26,11 @@ def a_head(name: str, pose_errors: dict | None = None) -> sd.Head:
         return NUMBERS.head(pose_errors=pose_errors)
     if name == "beams":
         return three_beams(window(rotation=(0.02, 0.01, 0.0)), pose_errors=pose_errors)
-    return sd.Head.from_design(sd.shipped_head(name), pose_errors=pose_errors or {})
+    return sd.Head.from_design(sd.optics.shipped_head(name), pose_errors=pose_errors or {})
 
 
-def by_name(head: sd.Head, **mirror: object) -> dict[tuple[str, str], sd.Sensitivity]:
-    return {(s.component, s.quantity): s for s in sd.head_sensitivities(head, **(MIRROR | mirror))}
+def by_name(head: sd.Head, **mirror: object) -> dict[tuple[str, str], sd.optics.Sensitivity]:
+    return {(s.component, s.quantity): s for s in sd.optics.head_sensitivities(head, **(MIRROR | mirror))}
 
 
 def parts(head: sd.Head) -> Iterator[str]:
@@ -211,7 +211,7 @@ def test_derivatives_by_the_state_of_the_air_are_the_published_ones() -> None:
 def test_reduced_derivatives_are_those_of_the_evaluation_s_reduction(name: str) -> None:
     """(distance, alpha, beta) of signals that are read; with the tilts of the mirror as they come out."""
     head = a_head(name)
-    derivatives = sd.head_sensitivities(head, **MIRROR)
+    derivatives = sd.optics.head_sensitivities(head, **MIRROR)
     calibration = head.calibration
 
     def reduce(signals: np.ndarray) -> np.ndarray:

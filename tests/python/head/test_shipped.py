@@ -45,7 +45,7 @@ def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped, step
     setup = Setup(steps, scale_lines=[])
     errors = with_reversal(setup.errors(21), setup.errors(23), 18)  # 20 um, 60 urad
     pose_errors = errors_of(read_description(SHIPPED_HEADS / f"{shipped.file}.toml", shipped.routes), 22)
-    design = sd.read_head_design(SHIPPED_HEADS / f"{shipped.file}.toml")
+    design = sd.optics.read_head_design(SHIPPED_HEADS / f"{shipped.file}.toml")
     head = sd.Head.from_design(design, standoff=110.0, pose_errors=dict(pose_errors))
     pairs = {
         line: {"reflector": (100e-6 * k, -150e-6 + 50e-6 * k), "laser": (200e-6, -70e-6 * k)}
@@ -88,12 +88,14 @@ def test_indices_are_those_of_the_published_formulas() -> None:
         # ... of which the vapour's was made with another gas constant: 5e-6 of what the vapour does, 4e-6.
         assert abs(moist - ciddor(wavelength)) <= 5e-11
         # The glass is seen through a head: a plate's constant is thickness (n/n_air - 1).
-    plate = sd.HeadBody.plate("plate", width=50, height=50, thickness=10.0, material="N-BK7", position=(10, 10, 40))
+    plate = sd.optics.HeadBody.plate(
+        "plate", width=50, height=50, thickness=10.0, material="N-BK7", position=(10, 10, 40)
+    )
     beams = [
-        sd.HeadBeam.interferometer(name, position=(x, y, 0), wavelength=633.0)
+        sd.optics.HeadBeam.interferometer(name, position=(x, y, 0), wavelength=633.0)
         for name, x, y in (("a", 0, 0), ("b", 20, 0), ("c", 0, 20))
     ]
-    head = sd.Head.from_design(sd.HeadDesign("plate", "multi_beam", [plate], beams))
+    head = sd.Head.from_design(sd.optics.HeadDesign("plate", "multi_beam", [plate], beams))
     air = sd.Environment.from_air().refractive_index(633.0)
     for constant in head.calibration.head_constants:
         assert abs((constant / 10.0 + 1) * air - glass_index("N-BK7", 633.0)) <= 1e-13  # paths rounded to 1e-13 mm

@@ -46,7 +46,9 @@ def test_plane_window_is_the_closed_form_plate(distance: float, tilt: tuple[floa
 def test_two_windows_of_catalogue_glass_in_real_air_add_up() -> None:
     air = sd.Environment.from_air(temperature=23.0, pressure=98000.0, relative_humidity=0.4)
     ratio = float(glass_index("N-BK7", 1530.0)) / air.refractive_index(1530.0)
-    second = sd.HeadBody.plate("second", width=60, height=60, thickness=8.0, material="N-BK7", position=(10, 10, 60))
+    second = sd.optics.HeadBody.plate(
+        "second", width=60, height=60, thickness=8.0, material="N-BK7", position=(10, 10, 60)
+    )
     head = three_beams(window(material="N-BK7"), second)
     for tilt in TILTS:
         readings = read(head, distance=700.0, tilt=tilt, environment=air)
@@ -124,7 +126,7 @@ FAR_OFFSETS = [(0.0, 0.0), (60.0, 0.0), (0.0, 60.0)]
 
 
 def wedge_head(angle: float = WEDGE) -> sd.Head:
-    glass = sd.HeadBody.wedge(
+    glass = sd.optics.HeadBody.wedge(
         "wedge", width=200, height=200, thickness=10, angle=angle, material=1.5, position=(0, 0, 30)
     )
     # The beam that is turned by 9 mrad comes back 18 mm aside from a mirror at 1 m.
@@ -145,7 +147,7 @@ def test_wedge_of_one_degree_does_what_its_closed_form_says(distance: float, the
 
 
 def test_wedge_turns_the_beam_by_exact_snell() -> None:
-    segments = sd.trace_beams(wedge_head(), distance=500.0, environment=sd.Environment())
+    segments = sd.optics.trace_beams(wedge_head(), distance=500.0, environment=sd.Environment())
     way = [s for s in segments if s.beam == "beam 1"]
     after = way[2]  # to the wedge, in it, and to the mirror
     direction = (after.end - after.start) / np.linalg.norm(after.end - after.start)
@@ -178,7 +180,7 @@ def test_weak_wedge_of_a_window_acts_as_a_turned_laser() -> None:
     wedge = math.radians(10 / 3600)
     setup = Setup(steps=12, lines=DIAGONALS)
     truth = setup.errors(12)
-    glass = sd.HeadBody.wedge(
+    glass = sd.optics.HeadBody.wedge(
         "window", width=80, height=80, thickness=5, angle=wedge, material=1.5, position=(10, 10, 30)
     )
     wedged = Setup(steps=12, head=three_beams(glass))

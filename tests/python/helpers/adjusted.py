@@ -30,18 +30,20 @@ def adjust(
             by_line.setdefault(key[0], {})[key[1]] = prior
     if known.smoothness:
         deviation = {name[1] in "ABC": value for name, value in known.smoothness.items()}
-        options["smoothness"] = sd.Smoothness(translation=deviation.get(False, 0.0), rotation=deviation.get(True, 0.0))
+        options["smoothness"] = sd.methods.Smoothness(
+            translation=deviation.get(False, 0.0), rotation=deviation.get(True, 0.0)
+        )
     if not known.rotations:
         options["rotations"] = False
-    return sd.adjust(
+    return sd.methods.adjust(
         run,
         options.pop("plan", None) or plan_of(scenario),
         options.pop("head", None) or head_of(scenario),
         sd.Chain(scenario.chain),
         scenario.tool,
-        uncertainty=sd.ReadingUncertainty(**known.uncertainty),
-        setup=sd.SetupPriors(**{key: prior for key, prior in known.setup.items() if isinstance(key, str)}),
-        setup_by_line={line: sd.SetupPriors(**priors) for line, priors in by_line.items()},
+        uncertainty=sd.methods.ReadingUncertainty(**known.uncertainty),
+        setup=sd.methods.SetupPriors(**{key: prior for key, prior in known.setup.items() if isinstance(key, str)}),
+        setup_by_line={line: sd.methods.SetupPriors(**priors) for line, priors in by_line.items()},
         one_setup_per_line=known.one_setup_per_line,
         reversal=known.reversal,
         **options,

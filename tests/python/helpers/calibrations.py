@@ -22,7 +22,7 @@ def simulate(seed: int, *, plan: sd.Plan = PLAN, head: sd.Head | None = None, **
 
 
 def calibrate(seed: int, *, plan: sd.Plan = PLAN, **options: Any) -> sd.Calibration:
-    return sd.evaluate(simulate(seed, plan=plan), plan, sd.Head(), CHAIN, TOOL, **options)
+    return sd.methods.evaluate(simulate(seed, plan=plan), plan, sd.Head(), CHAIN, TOOL, **options)
 
 
 def full_run() -> sd.Measurement:

@@ -50,8 +50,8 @@ class Case:
 
 def known_to(laser: float | str, mirror_of_scale_lines: str | None = None) -> dict[str, Any]:
     """What the adjustment is told: the laser of measured lines; scale lines are square."""
-    fixed = {line: sd.SetupPriors(laser="fixed", reflector=mirror_of_scale_lines) for line in SCALE_LINES}
-    return {"setup": sd.SetupPriors(laser=laser), "setup_by_line": fixed}
+    fixed = {line: sd.methods.SetupPriors(laser="fixed", reflector=mirror_of_scale_lines) for line in SCALE_LINES}
+    return {"setup": sd.methods.SetupPriors(laser=laser), "setup_by_line": fixed}
 
 
 # What adjust() knows by default of a line: lateral 1 mm, roll 20 mrad, gain 0.01.
@@ -106,8 +106,8 @@ def scale_lines_case(layout: str, laser: float, distance: float) -> Case:
     beams = layout == "multi_beam"  # which do not tell the mirror of a scale line from their constants
     of_lines: dict[str, Any] = {"reflector": 1e-3, "laser": 3e-4 if beams else 1e-3}
     told = {
-        "setup": sd.SetupPriors(laser=of_lines["laser"] if beams else "free"),
-        "setup_by_line": {line: sd.SetupPriors(laser=laser) for line in SCALE_LINES},
+        "setup": sd.methods.SetupPriors(laser=of_lines["laser"] if beams else "free"),
+        "setup_by_line": {line: sd.methods.SetupPriors(laser=laser) for line in SCALE_LINES},
     }
     return Case(
         "adjustment",
@@ -141,7 +141,7 @@ class Drawn:
     plan: sd.Plan
     head: sd.Head
     misalignment: dict[str, sd.Misalignment]
-    uncertainty: sd.ReadingUncertainty
+    uncertainty: sd.methods.ReadingUncertainty
     chain: str
 
     def noise_of(self, channel: str) -> float:
@@ -205,7 +205,7 @@ def draw(case: Case, seed: int, steps: int = STEPS) -> tuple[Drawn, np.random.Ge
         ),
         head,
         {line: setup_of(case, rng, line) for line in [*DIAGONALS, *SCALE_LINES]},
-        sd.ReadingUncertainty(
+        sd.methods.ReadingUncertainty(
             # By beams 20 mm apart: as good tilts as the others have.
             distance=case.distance or (log_uniform(rng, 2e-5, 2e-4) if beams else log_uniform(rng, 5e-5, 5e-4)),
             tilt=log_uniform(rng, 5e-7, 5e-6),
@@ -228,10 +228,12 @@ def evaluated(case: Case, drawn: Drawn, run: sd.Measurement) -> sd.Calibration:
     told = (run, drawn.plan, drawn.head, sd.Chain(drawn.chain), drawn.machine.tool)
     if case.method == "adjustment":
         # No reading is an outlier here; leaving out the worst would make the rest look better than it is.
-        return sd.adjust(
+        return sd.methods.adjust(
             *told, uncertainty=drawn.uncertainty, outlier_probability=0.0, full_covariance=True, **case.told
         ).calibration
-    return sd.evaluate(*told, method=case.method, uncertainty=drawn.uncertainty, full_covariance=True, **case.told)
+    return sd.methods.evaluate(
+        *told, method=case.method, uncertainty=drawn.uncertainty, full_covariance=True, **case.told
+    )
 
 
 @cache

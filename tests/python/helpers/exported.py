@@ -14,8 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from usual import SMALL_VOLUME as VOLUME
 
 import stepdiag as sd
-from stepdiag.export.common import ExportOptions
-from stepdiag.export.write import export_calibration
+from stepdiag.exporting.write import export
 
 TOOL = (3.0, -5.0, 40.0)
 CHAINS = ["[w X' b Y Z t]", "[w b X Y Z t]", "[w Y' X' b Z t]", "[w Z' b Y X t]", "[w X' Z' Y' b t]"]
@@ -63,7 +62,7 @@ def machine_of(calibration: sd.Calibration) -> sd.Machine:
 
 
 def export(calibration: sd.Calibration, to: str, output: Path, **options: Any) -> list[str]:
-    return export_calibration(calibration, to, output, ExportOptions(**options))
+    return sd.export(calibration, output, to=to, **options)
 
 
 def points_in(volume: tuple[float, ...], count: int, seed: int = 5) -> Vectors:

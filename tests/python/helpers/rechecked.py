@@ -38,13 +38,13 @@ def read_again(
     return coverage_cases.measured(again, rng)
 
 
-def options(drawn: coverage_cases.Drawn) -> sd.AdjustmentOptions:
-    return sd.AdjustmentOptions(uncertainty=drawn.uncertainty, setup=sd.SetupPriors(laser="free"))
+def options(drawn: coverage_cases.Drawn) -> sd.methods.AdjustmentOptions:
+    return sd.methods.AdjustmentOptions(uncertainty=drawn.uncertainty, setup=sd.methods.SetupPriors(laser="free"))
 
 
 def random_change(rng: np.random.Generator, size: float = 1.0) -> dict[str, float]:
     """By parameter; from the usual priors, or from `size` times as wide ones."""
-    priors = sd.ChangePriors()
+    priors = sd.methods.ChangePriors()
     return {name: size * getattr(priors, CHANGES[kind_of(name)]) * rng.normal() for name in (*FUNCTIONS, *SQUARENESSES)}
 
 
@@ -74,7 +74,7 @@ class Eventful:
     run: sd.Measurement
     plan: sd.Plan
     drawn: coverage_cases.Drawn
-    options: sd.AdjustmentOptions
+    options: sd.methods.AdjustmentOptions
     hit: tuple[str, int] | None  # line and point of the reading that is wrong, or of the first one that slipped
 
     @property
@@ -91,7 +91,7 @@ def after(event: str, layout: str, seed: int, steps: int = 8) -> Eventful:
     case = coverage_cases.CASES[{"ideal": "adjustment"}.get(layout, f"adjustment, layout {'ab'[layout == 'psd']}")]
     drawn, rng = coverage_cases.draw(case, seed, steps)
     distance = coverage_cases.log_uniform(rng, 1e-5, 1e-4)
-    uncertainty = sd.ReadingUncertainty(distance=distance, tilt=1e-2 * distance, spot=10.0 * distance)
+    uncertainty = sd.methods.ReadingUncertainty(distance=distance, tilt=1e-2 * distance, spot=10.0 * distance)
     drawn = dataclasses.replace(drawn, uncertainty=uncertainty)
     baseline = coverage_cases.evaluated(case, drawn, coverage_cases.measured(drawn, rng))
     diagonals, scale_lines = (*((lines, ()) for lines in LINES), (DIAGONALS, SCALE_LINES))[seed % 4]
@@ -110,7 +110,7 @@ def after(event: str, layout: str, seed: int, steps: int = 8) -> Eventful:
     told = {"setup": case.told["setup"], "setup_by_line": {}}
     if scale_lines:
         told = case.told
-    return Eventful(baseline, run, plan, drawn, sd.AdjustmentOptions(uncertainty=uncertainty, **told), hit)
+    return Eventful(baseline, run, plan, drawn, sd.methods.AdjustmentOptions(uncertainty=uncertainty, **told), hit)
 
 
 def _with_shape(machine: sd.Machine, event: str, rng: np.random.Generator) -> sd.Machine:

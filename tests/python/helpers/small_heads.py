@@ -18,12 +18,12 @@ Pair = tuple[float, float]
 PoseErrors = dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]]
 
 
-def window(**changes: Any) -> sd.HeadBody:
-    return sd.HeadBody.plate("window", **(WINDOW | changes))
+def window(**changes: Any) -> sd.optics.HeadBody:
+    return sd.optics.HeadBody.plate("window", **(WINDOW | changes))
 
 
 def three_beams(
-    *bodies: sd.HeadBody,
+    *bodies: sd.optics.HeadBody,
     offsets: list[Pair] = OFFSETS,
     standoff: float = 100.0,
     pose_errors: PoseErrors | None = None,
@@ -33,10 +33,10 @@ def three_beams(
     """Layout a: parallel beams from the reference plane, and bodies before them."""
     settings = {"aperture": APERTURE} | interferometer
     beams = [
-        sd.HeadBeam.interferometer(f"beam {i}", position=(u, v, 0.0), **settings)
+        sd.optics.HeadBeam.interferometer(f"beam {i}", position=(u, v, 0.0), **settings)
         for i, (u, v) in enumerate(offsets, start=1)
     ]
-    design = sd.HeadDesign("three beams", "multi_beam", list(bodies), beams)
+    design = sd.optics.HeadDesign("three beams", "multi_beam", list(bodies), beams)
     return sd.Head.from_design(design, standoff=standoff, pose_errors=pose_errors or {}, mirror=mirror)
 
 
@@ -62,30 +62,30 @@ class SpotHead:
 
     def head(
         self,
-        *bodies: sd.HeadBody,
+        *bodies: sd.optics.HeadBody,
         pose_errors: PoseErrors | None = None,
         material: str | float | None = None,
         **options: Any,
     ) -> sd.Head:
         x = 30.0
-        cube = sd.HeadBody.cube_splitter(
+        cube = sd.optics.HeadBody.cube_splitter(
             "cube", edge=self.edge, material=material or self.index, position=(x, 0.0, self.centre)
         )
         beams = [
-            sd.HeadBeam.interferometer("distance", aperture=18.0),
-            sd.HeadBeam.spot("laser", sensor="psd", position=(x, 0.0, self.laser)),
+            sd.optics.HeadBeam.interferometer("distance", aperture=18.0),
+            sd.optics.HeadBeam.spot("laser", sensor="psd", position=(x, 0.0, self.laser)),
         ]
         # The cube sends the returning light to -x: sensor x = head z, which unfolds to head x; sensor y = head y.
-        device = sd.SpotSensor.lateral_effect(
+        device = sd.optics.SpotSensor.lateral_effect(
             "psd", position=(x - self.lever, 0.0, self.centre), rotation=(0.0, -pi / 2, 0.0)
         )
-        design = sd.HeadDesign("spot head", "psd", [cube, *bodies], beams, [device])
+        design = sd.optics.HeadDesign("spot head", "psd", [cube, *bodies], beams, [device])
         return sd.Head.from_design(design, pose_errors=pose_errors or {}, **options)
 
 
 def read(head: sd.Head, **mirror: Any) -> np.ndarray:
     """The signals in order; NaN for a lost one."""
-    signals = sd.read_head(head, **mirror)
+    signals = sd.optics.read_signals(head, **mirror)
     return np.array([np.nan if signals[name] is None else signals[name] for name in head.signals], dtype=float)
 
 

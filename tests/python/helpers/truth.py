@@ -52,7 +52,7 @@ class Setup:
         return sd.simulate(machine, self.plan, self.head, misalignment=by_line, noise=noise or sd.Noise())
 
     def evaluate(self, run: sd.Measurement, *, method: str = "enhanced", **options: Any) -> sd.Calibration:
-        return sd.evaluate(run, self.plan, self.head, sd.Chain(self.chain), self.tool, method=method, **options)
+        return sd.methods.evaluate(run, self.plan, self.head, sd.Chain(self.chain), self.tool, method=method, **options)
 
 
 def changed(

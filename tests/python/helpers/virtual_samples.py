@@ -22,14 +22,16 @@ COMPONENTS = {"reflector": 2, "laser": 2, "psd_zero": 2, "lateral": 2}
 SCALARS = ("distance_constant", "roll", "gain", "drift")
 
 
-def number(seed: int, samples: np.ndarray, sequence: int, index: int, distribution: sd.Distribution) -> np.ndarray:
+def number(
+    seed: int, samples: np.ndarray, sequence: int, index: int, distribution: sd.montecarlo.Distribution
+) -> np.ndarray:
     """Number `index` of a sequence, of its distribution."""
     normal = normal_pair(seed, VIRTUAL_CALIBRATION, samples, sequence * SEQUENCE + index // 2)[index % 2]
     u, v = uniform_pair(seed, VIRTUAL_CALIBRATION, samples, sequence * SEQUENCE + index, 1)
     return distribution.expectation + distribution.spread * standard(distribution, normal, u, v)
 
 
-def standard(distribution: sd.Distribution, normal: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+def standard(distribution: sd.montecarlo.Distribution, normal: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Of expectation 0 and spread 1 (JCGM 101, 6.4; quantile functions where they are closed)."""
     if distribution.kind == "rectangular":
         return 2.0 * u - 1.0
@@ -47,7 +49,7 @@ def standard(distribution: sd.Distribution, normal: np.ndarray, u: np.ndarray, v
     return normal
 
 
-def drawn(inputs: sd.UncertainInputs, seed: int, samples: Sequence[int] | np.ndarray) -> np.ndarray:
+def drawn(inputs: sd.montecarlo.UncertainInputs, seed: int, samples: Sequence[int] | np.ndarray) -> np.ndarray:
     """Deviations of the inputs, (inputs, samples)."""
     at = np.asarray(samples, dtype=np.uint64)
     values = np.array([number(seed, at, 0, i, x.distribution) for i, x in enumerate(inputs.inputs)])
@@ -79,7 +81,7 @@ class Sample:
         self,
         scenario: reference.Scenario,
         table: reference.ErrorTable,
-        inputs: sd.UncertainInputs,
+        inputs: sd.montecarlo.UncertainInputs,
         values: Sequence[float] | np.ndarray,
         *,
         air: Air | None = None,

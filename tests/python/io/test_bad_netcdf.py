@@ -29,8 +29,8 @@ Change = Callable[[xr.Dataset], xr.Dataset]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a sound measurement and a sound calibration."""
     folder = tmp_path_factory.mktemp("sound")
-    sd.write_measurement(full_run(), folder / "measurement.nc")
-    sd.write_calibration(calibrate(1, full_covariance=True), folder / "calibration.nc")
+    full_run().write(folder / "measurement.nc")
+    calibrate(1, full_covariance=True).write(folder / "calibration.nc")
     return folder
 
 

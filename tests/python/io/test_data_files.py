@@ -11,10 +11,10 @@ import stepdiag as sd
 def test_ending_decides_between_csv_and_netcdf(tmp_path: Path) -> None:
     run, calibration = simulate(1), calibrate(1)
     for name, begins in (("file.csv", b"line,point"), ("file.NC", b"\x89HDF"), ("file", b"line,point")):
-        sd.write_measurement(run, tmp_path / name)
+        run.write(tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(begins)
         assert same_run(sd.read_measurement(str(tmp_path / name)), run)
-    sd.write_calibration(calibration, tmp_path / "file.csv")
+    calibration.write(tmp_path / "file.csv")
     assert same_calibration(sd.read_calibration(tmp_path / "file.csv"), calibration)
 
 
@@ -24,14 +24,14 @@ def test_date_is_that_of_the_environment_and_then_kept(
 ) -> None:
     calibration = calibrate(1)
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86399")
-    sd.write_calibration(calibration, tmp_path / f"one.{ending}")
+    calibration.write(tmp_path / f"one.{ending}")
     read = sd.read_calibration(tmp_path / f"one.{ending}")
     assert read.date == "1970-01-01T23:59:59Z"
     monkeypatch.delenv("SOURCE_DATE_EPOCH")
-    sd.write_calibration(read, tmp_path / f"two.{ending}")
+    read.write(tmp_path / f"two.{ending}")
     assert sd.read_calibration(tmp_path / f"two.{ending}").date == read.date
     assert (tmp_path / f"one.{ending}").read_bytes() == (tmp_path / f"two.{ending}").read_bytes()
-    sd.write_calibration(calibration, tmp_path / f"now.{ending}")
+    calibration.write(tmp_path / f"now.{ending}")
     assert sd.read_calibration(tmp_path / f"now.{ending}").date > "2026"
 
 
@@ -41,4 +41,4 @@ def test_date_of_the_environment_that_is_none_is_refused(
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
     with pytest.raises(sd.InvalidArgument, match="SOURCE_DATE_EPOCH"):
-        sd.write_calibration(calibrate(1), tmp_path / "calibration.csv")
+        calibrate(1).write(tmp_path / "calibration.csv")

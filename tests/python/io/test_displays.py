@@ -34,19 +34,22 @@ def values() -> Mapping[str, Any]:
     scenario = sd.parse_scenario(SCENARIO)
     run = simulate(1)
     a, b = calibrate(1, full_covariance=True), calibrate(2, method="enhanced")
-    found = sd.adjust(run, PLAN, sd.Head(), CHAIN, reliability=True)
-    comparison = sd.compare_calibrations(a, b)
-    described = sd.shipped_head("beam_and_psd")
+    found = sd.methods.adjust(run, PLAN, sd.Head(), CHAIN, reliability=True)
+    comparison = sd.compare(a, b)
+    described = sd.optics.shipped_head("beam_and_psd")
     made = [
         *(scenario, scenario.known, scenario.truth, scenario.machine(), scenario.known.plan, scenario.known.head),
         *(run, a, found, found.verdict, *found.setup[:1], *found.reliability[:1], *found.calibration.findings[:1]),
         *(comparison, comparison.differences[0], a.to_error_map(), a.chain),
         *(described, described.bodies[0], described.beams[0], *described.sensors[:1]),
-        *(sd.volumetric_accuracy(a), sd.error_at_point(a, (1, 2, 3)), sd.volume_errors(a, limit=0.02)),
-        *(sd.volume_change(comparison), sd.predict_positions(a, *sd.axis_line(a, "X"))),
-        *(sd.read_positions(READINGS), sd.evaluate_positions(sd.read_positions(READINGS))),
-        sd.evaluate_uncertainty(scenario, sd.UncertaintyRequest(samples=10_000)),
-        *(sd.Noise(), sd.Misalignment(), sd.Distribution(spread=1.0), sd.ReadingUncertainty()),
+        *(sd._core.volumetric_accuracy(a), sd._core.error_at_point(a, (1, 2, 3)), sd.volume(a, limit=0.02)),
+        *(sd.volume_change(comparison), sd.positions.predict_positions(a, *sd.positions.axis_line(a, "X"))),
+        *(
+            sd.positions.read_positions(READINGS),
+            sd.positions.evaluate_positions(sd.positions.read_positions(READINGS)),
+        ),
+        sd.montecarlo.evaluate_uncertainty(scenario, sd.montecarlo.UncertaintyRequest(samples=10_000)),
+        *(sd.Noise(), sd.Misalignment(), sd.montecarlo.Distribution(spread=1.0), sd.methods.ReadingUncertainty()),
     ]
     return {type(value).__name__: value for value in made}
 
@@ -135,7 +138,7 @@ def test_parameter_by_name_gives_its_entries(values: Mapping[str, Any]) -> None:
 
 def test_reversal_error_by_name() -> None:
     run = simulate(1, repeats=1, backward=True)
-    calibration = sd.evaluate(run, PLAN, sd.Head(), CHAIN)
+    calibration = sd.methods.evaluate(run, PLAN, sd.Head(), CHAIN)
     assert calibration.reversal
     for name, table in calibration.reversal.items():
         np.testing.assert_array_equal(calibration[f"{name}_reversal"].value, table[1])

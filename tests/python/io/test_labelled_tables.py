@@ -14,7 +14,7 @@ from stepdiag.parameters import kind_of
 def calibrate(plan: sd.Plan) -> sd.Calibration:
     machine = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=3), (1.0, 2.0, 3.0))
     head = sd.Head()
-    return sd.evaluate(sd.simulate(machine, plan, head), plan, head, machine.chain, machine.tool)
+    return sd.methods.evaluate(sd.simulate(machine, plan, head), plan, head, machine.chain, machine.tool)
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,7 @@ def test_zeros_of_a_netcdf_file_are_lost_too(folder: Path) -> None:
     dark = np.isnan(sd.read_measurement("zeros.csv").channels["distance"])
     assert dark.sum() == len(LOST)
     channels = {name: np.where(dark, 0.0, values) for name, values in good.channels.items()}
-    sd.write_measurement(sd.Measurement(good.line, good.point, good.position, channels), "zeros.nc")
+    sd.Measurement(good.line, good.point, good.position, channels).write("zeros.nc")
     for values in sd.read_measurement("zeros.nc").channels.values():
         assert np.array_equal(np.isnan(values), dark)
 

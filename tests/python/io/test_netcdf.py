@@ -21,13 +21,13 @@ from stepdiag.calibration.finding_text import combination_text
 def adjustment() -> tuple[sd.Adjustment, sd.Measurement]:
     """One with set-ups, residuals, reversal and covariance, and its run."""
     run = simulate(1, backward=True)
-    return sd.adjust(run, PLAN, sd.Head(), CHAIN, TOOL, full_covariance=True), run
+    return sd.methods.adjust(run, PLAN, sd.Head(), CHAIN, TOOL, full_covariance=True), run
 
 
 # --- there and back --------------------------------------------------------------------------------------------------
 def test_measurement_comes_back_with_the_same_bits(tmp_path: Path) -> None:
     run = full_run()
-    sd.write_measurement(run, tmp_path / "run.nc")
+    run.write(tmp_path / "run.nc")
     assert same_run(sd.read_measurement(tmp_path / "run.nc"), run)
 
 
@@ -41,7 +41,7 @@ def test_measurement_comes_back_with_the_same_bits(tmp_path: Path) -> None:
 )
 def test_measurement_of_every_layout_comes_back(tmp_path: Path, head: sd.Head) -> None:
     run = simulate(1, head=head)
-    sd.write_measurement(run, tmp_path / "run.nc")
+    run.write(tmp_path / "run.nc")
     assert same_run(sd.read_measurement(tmp_path / "run.nc"), run)
 
 
@@ -56,7 +56,7 @@ CALIBRATIONS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("options", CALIBRATIONS.values(), ids=CALIBRATIONS)
 def test_calibration_comes_back_with_the_same_bits(tmp_path: Path, options: dict[str, Any]) -> None:
     calibration = calibrate(1, **options)
-    sd.write_calibration(calibration, tmp_path / "calibration.nc")
+    calibration.write(tmp_path / "calibration.nc")
     assert same_calibration(sd.read_calibration(tmp_path / "calibration.nc"), calibration)
 
 
@@ -66,7 +66,7 @@ def test_calibration_of_an_adjustment_comes_back_with_the_same_bits(
     result, run = adjustment
     assert result.calibration.reversal
     assert result.calibration.undetermined_reversal_constants
-    sd.write_calibration(result, tmp_path / "calibration.nc", measurement=run)
+    result.write(tmp_path / "calibration.nc", measurement=run)
     assert same_calibration(sd.read_calibration(tmp_path / "calibration.nc"), result.calibration)
 
 
@@ -96,7 +96,7 @@ def test_odd_calibration_comes_back_with_the_same_bits(tmp_path: Path) -> None:
     )
     nothing = sd.Calibration("none", "[w b X Y Z t]", VOLUME, TOOL, {}, undetermined=["everything"])
     for calibration in (odd, nothing):
-        sd.write_calibration(calibration, tmp_path / "calibration.nc")
+        calibration.write(tmp_path / "calibration.nc")
         assert same_calibration(sd.read_calibration(tmp_path / "calibration.nc"), calibration)
 
 
@@ -105,8 +105,8 @@ def test_stranger_finds_units_and_a_meaning_for_every_variable(
     adjustment: tuple[sd.Adjustment, sd.Measurement], tmp_path: Path
 ) -> None:
     result, run = adjustment
-    sd.write_calibration(result, tmp_path / "calibration.nc", measurement=run)
-    sd.write_measurement(full_run(), tmp_path / "run.nc")
+    result.write(tmp_path / "calibration.nc", measurement=run)
+    full_run().write(tmp_path / "run.nc")
     for file in ("calibration.nc", "run.nc"):
         with xr.open_dataset(tmp_path / file) as table:
             assert table.attrs["Conventions"] == "CF-1.11"
@@ -119,7 +119,7 @@ def test_stranger_finds_units_and_a_meaning_for_every_variable(
 
 
 def test_stranger_finds_the_machine_and_the_reference_of_straightness(tmp_path: Path) -> None:
-    sd.write_calibration(calibrate(1), tmp_path / "calibration.nc")
+    calibrate(1).write(tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
         assert table.attrs["chain"] == CHAIN
         assert tuple(table.attrs["volume_mm"]) == VOLUME
@@ -134,7 +134,7 @@ def test_covariance_is_labelled(tmp_path: Path) -> None:
     calibration = calibrate(1, full_covariance=True)
     covariance = calibration.covariance
     assert covariance is not None
-    sd.write_calibration(calibration, tmp_path / "calibration.nc")
+    calibration.write(tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
         labels = list(zip(table["covariance_parameter"].values, table["covariance_position"].values, strict=True))
         i, j = labels.index(("EYX", 32.0)), labels.index(("ECX", 48.0))
@@ -144,7 +144,7 @@ def test_covariance_is_labelled(tmp_path: Path) -> None:
 
 def test_all_of_an_adjustment_is_in_its_file(adjustment: tuple[sd.Adjustment, sd.Measurement], tmp_path: Path) -> None:
     result, run = adjustment
-    sd.write_calibration(result, tmp_path / "calibration.nc", measurement=run)
+    result.write(tmp_path / "calibration.nc", measurement=run)
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
         for channel, residual in result.residuals.items():
             np.testing.assert_array_equal(table[f"{channel}_residual"], residual)
@@ -188,7 +188,7 @@ def test_outliers_are_in_the_file(adjustment: tuple[sd.Adjustment, sd.Measuremen
     other = SimpleNamespace(
         row=3, run=0, line="ppp", point=3, channel="alpha", residual=-1e-4, normalised=-21.5, number=2
     )
-    sd.write_calibration(cast(Any, WithOutliers(adjustment[0], [worst, other])), tmp_path / "calibration.nc")
+    cast(Any, WithOutliers(adjustment[0], [worst, other])).write(tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
         for name in ("row", "run", "line", "point", "channel", "residual", "number"):
             assert table[f"outlier_{name}"].values.tolist() == [getattr(worst, name), getattr(other, name)]
@@ -196,9 +196,9 @@ def test_outliers_are_in_the_file(adjustment: tuple[sd.Adjustment, sd.Measuremen
 
 
 def test_smoothness_in_force_is_named(tmp_path: Path) -> None:
-    smooth = sd.Smoothness(translation=1e-3, rotation=1e-5)
-    result = sd.adjust(simulate(1), PLAN, sd.Head(), CHAIN, TOOL, smoothness=smooth)
-    sd.write_calibration(result, tmp_path / "calibration.nc")
+    smooth = sd.methods.Smoothness(translation=1e-3, rotation=1e-5)
+    result = sd.methods.adjust(simulate(1), PLAN, sd.Head(), CHAIN, TOOL, smoothness=smooth)
+    result.write(tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
         assert result.smoothness
         for name, deviation in result.smoothness.items():
@@ -206,7 +206,7 @@ def test_smoothness_in_force_is_named(tmp_path: Path) -> None:
 
 
 def test_adjustment_in_csv_is_its_calibration(adjustment: tuple[sd.Adjustment, sd.Measurement], tmp_path: Path) -> None:
-    sd.write_calibration(adjustment[0], tmp_path / "calibration.csv")
+    adjustment[0].write(tmp_path / "calibration.csv")
     read = sd.read_calibration(tmp_path / "calibration.csv")
     assert read.functions.keys() == adjustment[0].calibration.functions.keys()
 
@@ -235,19 +235,19 @@ def test_path_that_cannot_be_written_is_refused_and_leaves_nothing(tmp_path: Pat
     (tmp_path / "file").write_text("kept")
     for path in ("no/such.nc", "folder.nc", "file/below.nc"):
         with pytest.raises(sd.InvalidArgument, match=path):
-            sd.write_calibration(calibrate(1), tmp_path / path)
+            calibrate(1).write(tmp_path / path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder.nc"]
 
 
 def test_write_that_fails_half_way_leaves_the_old_file(tmp_path: Path) -> None:
     """The disk is full: here, files may have 10,000 bytes at most."""
-    sd.write_measurement(simulate(1), tmp_path / "run.csv")
+    simulate(1).write(tmp_path / "run.csv")
     (tmp_path / "run.nc").write_text("the old file")
     program = (
         "import resource, sys, stepdiag as sd, stepdiag.io.netcdf_write\n"
         "run = sd.read_measurement(sys.argv[1] + '.csv')\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (10000, 10000))\n"
-        "try: sd.write_measurement(run, sys.argv[1] + '.nc')\n"
+        "try: run.write(sys.argv[1] + '.nc')\n"
         "except sd.InvalidArgument as refusal: print('refused', refusal)\n"
     )
     result = subprocess.run(
@@ -262,7 +262,7 @@ def test_file_is_replaced_with_its_permissions_behind_its_link(tmp_path: Path) -
     (tmp_path / "target.nc").write_text("the old file")
     (tmp_path / "target.nc").chmod(0o640)
     (tmp_path / "link.nc").symlink_to("target.nc")
-    sd.write_measurement(simulate(1), tmp_path / "link.nc")
+    simulate(1).write(tmp_path / "link.nc")
     assert (tmp_path / "link.nc").is_symlink()
     assert (tmp_path / "target.nc").stat().st_mode & 0o777 == 0o640
     assert same_run(sd.read_measurement(tmp_path / "target.nc"), simulate(1))

@@ -41,7 +41,7 @@ def ended(command: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
 
 
-@pytest.mark.parametrize("reader", [*CSV_READERS, sd.read_scenario, sd.read_head_design])
+@pytest.mark.parametrize("reader", [*CSV_READERS, sd.read_scenario, sd.optics.read_head_design])
 def test_reader_refuses_a_pipe_without_a_writer(here: Path, reader: Callable[[str], Any]) -> None:
     refused(reader, "pipe", names=f"pipe: {NO_WRITER}")
 

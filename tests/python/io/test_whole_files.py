@@ -85,7 +85,7 @@ def test_a_full_disk_leaves_nothing_half_written(scenario: Path, command: list[s
     "write",
     [
         lambda path: main(["simulate", "scenario.toml", "-o", str(path), "--overwrite"]),
-        lambda path: sd.write_measurement(sd.simulate_scenario(sd.read_scenario("scenario.toml")), path),
+        lambda path: sd.simulate(sd.read_scenario("scenario.toml")).write(path),
     ],
     ids=["command", "library"],
 )

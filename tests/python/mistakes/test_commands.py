@@ -23,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def write(factor: float, *names: str) -> None:
     """run.csv with these channels times a factor."""
-    run = sd.simulate_scenario(sd.read_scenario("scenario.toml"))
+    run = sd.simulate(sd.read_scenario("scenario.toml"))
     changed(run, {name: factor * run.channels[name] for name in names}).write("run.csv")
 
 
@@ -92,9 +92,11 @@ def test_report_says_what_no_reading_shows(folder: Path, capsys: pytest.CaptureF
 def test_no_reading_shows_the_tool(tool: tuple[float, float, float]) -> None:
     """Another tool fits as well: errors of the axes absorb it, to first order exactly."""
     scenario = sd.parse_scenario(STATED)
-    known, run = scenario.known, sd.simulate_scenario(scenario)
+    known, run = scenario.known, sd.simulate(scenario)
     fits = [
-        sd.adjust(run, known.plan, known.head, known.chain, offset, uncertainty=known.uncertainty).weighted_square_sum
+        sd.methods.adjust(
+            run, known.plan, known.head, known.chain, offset, uncertainty=known.uncertainty
+        ).weighted_square_sum
         for offset in ((0.0, 0.0, 0.0), tool)
     ]
     assert abs(np.diff(fits)[0]) < 1.0

@@ -46,7 +46,7 @@ MADE: list[Callable[[sd.Measurement], sd.Measurement]] = [
 @pytest.mark.parametrize("number", range(len(MADE)))
 def test_page_says_what_the_program_says(number: int) -> None:
     scenario = sd.read_scenario(EXAMPLES / "scenario.toml")
-    found = sd.find_mistakes(scenario, MADE[number](sd.simulate_scenario(scenario)))
+    found = sd.find_mistakes(scenario, MADE[number](sd.simulate(scenario)))
     what = re.sub(r" \(variance factor [^)]*\)$", "", mistake_text(found))
     said = [f"rejected because {mistake_reason(what)}", *change_rows(found)]
     assert BLOCKS[number].splitlines() == said

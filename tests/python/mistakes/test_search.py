@@ -21,7 +21,7 @@ def test_quick_fit_is_that_of_the_adjustment(head: str) -> None:
     run, known = simulated(scenario, seed=2), scenario.known
     options = adjustment_options(known)
     quick = fit_quality(run, known.plan, known.head, known.chain, known.tool, options, 30)
-    adjusted = sd.adjust_scenario(scenario, run)
+    adjusted = sd.methods.adjust_scenario(scenario, run)
     assert quick is not None
     assert quick.degrees_of_freedom == adjusted.degrees_of_freedom
     assert quick.weighted_square_sum == pytest.approx(adjusted.weighted_square_sum, rel=1e-8)
@@ -77,7 +77,7 @@ def test_a_single_wrong_reading_is_no_mistake_of_the_catalogue(size: float) -> N
     distance = run.channels["distance"].copy()
     distance[rows_of(run, "npp")[8]] += size
     wrong = changed(run, {"distance": distance})
-    adjustment = sd.adjust_scenario(scenario, wrong)
+    adjustment = sd.methods.adjust_scenario(scenario, wrong)
     assert adjustment.faults
     assert sd.find_mistakes(scenario, wrong, adjustment) == []
 
@@ -88,7 +88,7 @@ def test_a_slip_is_named_by_the_faults_alone() -> None:
     distance = run.channels["distance"].copy()
     distance[rows_of(run, "npp")[8:]] += 0.02
     wrong = changed(run, {"distance": distance})
-    adjustment = sd.adjust_scenario(scenario, wrong)
+    adjustment = sd.methods.adjust_scenario(scenario, wrong)
     assert adjustment.verdict.fit == "rejected"
     assert sd.find_mistakes(scenario, wrong, adjustment) == []
 
@@ -121,7 +121,7 @@ def test_a_factor_on_one_line_is_named_once() -> None:
     factors = np.ones(len(run))
     factors[rows_of(run, "npp")] = 1.00005
     wrong = changed(run, {"distance": run.channels["distance"] * factors})
-    adjustment = sd.adjust_scenario(scenario, wrong)
+    adjustment = sd.methods.adjust_scenario(scenario, wrong)
     assert {fault.kind for found in adjustment.faults for fault in found.members} >= {"factor"}
     (found,) = sd.find_mistakes(scenario, wrong, adjustment)
     assert "on the scale lines" in found.text
@@ -146,7 +146,7 @@ def test_a_gross_mistake_is_known_before_the_adjustment() -> None:
     wrong = changed(run, {"alpha": -run.channels["alpha"]})
     (found,) = MistakeSearch(scenario, wrong).before()
     assert found.text == "alpha has the wrong sign on all lines"
-    adjustment = sd.adjust_scenario(scenario, wrong, search_faults=False)
+    adjustment = sd.methods.adjust_scenario(scenario, wrong, search_faults=False)
     assert adjustment.faults == []
     assert adjustment.verdict.fit == "rejected"
 
@@ -161,7 +161,7 @@ def test_gross_faults_are_not_taken_for_a_mistake(size: float, row: int) -> None
 
 
 def test_of_many_alternatives_some_are_counted() -> None:
-    one = sd.FoundMistake("sign", "alpha has the wrong sign", "change it", "accepted", 1.0, 90.0)
+    one = sd.results.FoundMistake("sign", "alpha has the wrong sign", "change it", "accepted", 1.0, 90.0)
     text = mistake_text([replace(one, alternatives=3), one])
     assert text.startswith("either alpha has the wrong sign; or alpha has the wrong sign; or one of 3 more; with")
 

@@ -25,7 +25,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def write(text: str) -> None:
     Path("scenario.toml").write_text(text)
-    sd.write_measurement(sd.simulate_scenario(sd.read_scenario("scenario.toml")), "run.csv")
+    sd.simulate(sd.read_scenario("scenario.toml")).write("run.csv")
 
 
 def wrong(size: float) -> None:
@@ -33,7 +33,7 @@ def wrong(size: float) -> None:
     run = sd.read_measurement("run.csv")
     channels = {name: values.copy() for name, values in run.channels.items()}
     channels["distance"][10] += size
-    sd.write_measurement(sd.Measurement(run.line, run.point.tolist(), run.position, channels), "run.csv")
+    sd.Measurement(run.line, run.point.tolist(), run.position, channels).write("run.csv")
 
 
 def texts_in(path: str) -> dict[tuple[str, str], tuple[float, float]]:
@@ -74,7 +74,7 @@ def test_file_and_exit_status_are_those_without_json(here: Path, monkeypatch: py
 def test_adjustment_has_setup_reliability_and_fit(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = printed("evaluation", capsys, "evaluate", *FILES, "-o", "c.csv", "--reliability")
     known = sd.read_scenario("scenario.toml").known
-    found = sd.adjust_scenario(known, sd.read_measurement("run.csv"), reliability=True)
+    found = sd.methods.adjust_scenario(known, sd.read_measurement("run.csv"), reliability=True)
     adjustment = said["adjustment"]
     assert said["fit"]["verdict"] == found.verdict.fit
     assert said["fit"]["variance_factor"] == found.variance_factor
@@ -123,7 +123,7 @@ def test_undetermined_and_combinations_are_told(here: Path, capsys: pytest.Captu
     write(TILTED.replace('scale_lines = ["p00", "0p0", "00p"]', "scale_lines = []"))
     said = printed("evaluation", capsys, "evaluate", *FILES, "-o", "c.csv")
     known = sd.read_scenario("scenario.toml").known
-    found = sd.adjust_scenario(known, sd.read_measurement("run.csv"))
+    found = sd.methods.adjust_scenario(known, sd.read_measurement("run.csv"))
     assert [finding["part"] for finding in said["calibration"]["findings"]] == [
         finding.part for finding in found.calibration.findings
     ]

@@ -20,16 +20,16 @@ from stepdiag.planning.observation import prospects
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("scenario.toml").write_text(SCENARIO)
-    sd.write_measurement(sd.simulate_scenario(sd.read_scenario("scenario.toml")), "run.csv")
-    sd.write_calibration(calibrate(1, method="enhanced"), "a.csv")
+    sd.simulate(sd.read_scenario("scenario.toml")).write("run.csv")
+    calibrate(1, method="enhanced").write("a.csv")
     parts = parts_of(calibrate(2, full_covariance=True))
     parts["functions"]["EXX"][1][3] += 5e-3
-    sd.write_calibration(sd.Calibration(**parts), "b.nc")
+    sd.Calibration(**parts).write("b.nc")
     return tmp_path
 
 
 def reject(file: str, name: str) -> None:
-    sd.write_calibration(sd.read_calibration(file).judged("rejected", ["it was dropped"]), name)
+    sd.read_calibration(file).judged("rejected", ["it was dropped"]).write(name)
 
 
 def one_value(entry: dict[str, Any], beginning: str) -> tuple[Any, float]:
@@ -76,7 +76,7 @@ def test_report_of_a_rejected_fit_ends_with_status_3(here: Path, capsys: pytest.
 def test_csv_without_uncertainties_gives_null(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     parts = parts_of(calibrate(1))
     parts["functions"]["EXX"] = (*parts["functions"]["EXX"][:2], np.full(len(parts["functions"]["EXX"][0]), np.nan))
-    sd.write_calibration(sd.Calibration(**parts), "n.csv")
+    sd.Calibration(**parts).write("n.csv")
     said = printed("report", capsys, "report", "n.csv")
     (table,) = [table for table in said["calibration"]["functions"] if table["parameter"] == "EXX"]
     assert set(table["standard_uncertainty_um"]) == {None}
@@ -84,7 +84,7 @@ def test_csv_without_uncertainties_gives_null(here: Path, capsys: pytest.Capture
 
 def test_comparison_has_the_differences(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = printed("comparison", capsys, "compare", "a.csv", "b.nc")
-    comparison = sd.compare_calibrations(sd.read_calibration("a.csv"), sd.read_calibration("b.nc"))
+    comparison = sd.compare(sd.read_calibration("a.csv"), sd.read_calibration("b.nc"))
     assert said["significant"] == ["EXX"]
     assert (said["values"], said["threshold"]) == (comparison.count, comparison.threshold)
     assert (said["a"]["file"], said["b"]["file"]) == ("a.csv", "b.nc")
@@ -134,7 +134,7 @@ def test_check_tells_files_and_runs(here: Path, capsys: pytest.CaptureFixture[st
     assert [file["kind"] for file in said["files"]] == ["scenario", "measurement", "calibration"]
     assert said["files"][2]["fit"]["verdict"] == sd.read_calibration("a.csv").fit
     (run,) = said["runs"]
-    found = sd.adjust_scenario(sd.read_scenario("scenario.toml").known, sd.read_measurement("run.csv"))
+    found = sd.methods.adjust_scenario(sd.read_scenario("scenario.toml").known, sd.read_measurement("run.csv"))
     assert (run["run"], run["scenario"], run["fit"]["verdict"]) == ("run.csv", "scenario.toml", found.verdict.fit)
 
 

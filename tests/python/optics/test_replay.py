@@ -33,9 +33,9 @@ def mirrors(run: sd.Measurement, reflector: tuple[float, float] = TURNED) -> lis
     return [mirror_in_sensor_frame(scenario, table, LINE, position) for position in run.position]
 
 
-def screen(x: float, width: float, name: str = "screen") -> sd.HeadBody:
+def screen(x: float, width: float, name: str = "screen") -> sd.optics.HeadBody:
     """Before the beams, 40 mm from the reference plane: the light on its way back passes it at x."""
-    return sd.HeadBody.screen(name, width=width, height=8.0, position=(x, 0.0, 40.0))
+    return sd.optics.HeadBody.screen(name, width=width, height=8.0, position=(x, 0.0, 40.0))
 
 
 ALL_BUT_ONE_IN_A_MILLION = 1 - 1e-6  # a share of 1 is no verification: everything is traced

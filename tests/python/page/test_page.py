@@ -176,7 +176,7 @@ def test_both_directions_of_approach_are_drawn_and_told(here: Path) -> None:
         assert trace["x"] == position.tolist()
         factor = sd.in_report_units(sd.kind_of(name), 1.0)
         np.testing.assert_allclose(trace["y"], factor * value, rtol=0.0, atol=5.1e-5)  # rounded to 0.1 nm
-    found = sd.volume_errors(calibration)
+    found = sd.volume(calibration)
     if calibration.undetermined_reversal_constants:
         assert "Not all reversal errors are known." in page.text
     else:
@@ -243,7 +243,7 @@ def test_calibration_and_machine_are_asked_about_by_name(
     fit: str, is_valid: str, of_machine: str, evaluated: Path
 ) -> None:
     """An answer about the readings is none about the machine, and rests on it."""
-    sd.write_calibration(sd.read_calibration("calibration.nc").judged(fit, ["x"]), "judged.nc")
+    sd.read_calibration("calibration.nc").judged(fit, ["x"]).write("judged.nc")
     text = page_of(calibration=Path("judged.nc"), limit=0.001).text
     assert f"The machine Is the machine within 1 µm? {of_machine}" in text
     assert f"The calibration Is this calibration valid? {is_valid}" in text
@@ -264,12 +264,12 @@ def test_unverified_calibration_is_not_called_valid(evaluated: Path) -> None:
 
 @pytest.mark.parametrize("fit", ["accepted", "doubtful", "unchecked", "rejected"])
 def test_what_is_not_valid_is_stamped_on_screen_and_on_paper(fit: str, evaluated: Path) -> None:
-    sd.write_calibration(sd.read_calibration("calibration.nc").judged(fit, ["x"]), "judged.nc")
+    sd.read_calibration("calibration.nc").judged(fit, ["x"]).write("judged.nc")
     text = report_page(ReportRequest(calibration=Path("judged.nc")), Path("report.html"))[0]
     is_valid = fit == "accepted"
     assert (f'<p class="stamp {fit}"' in text) != is_valid
     assert (f"@top-center {{ content: 'Calibration {fit.upper()}: " in text) != is_valid
-    sd.write_calibration(sd.read_calibration("calibration.nc").judged("accepted", []), "sound.nc")
+    sd.read_calibration("calibration.nc").judged("accepted", []).write("sound.nc")
     earlier = ReportRequest(calibration=Path("sound.nc"), before=Path("judged.nc"))
     said = f"@top-center {{ content: 'The earlier calibration is {fit.upper()}: "
     assert (said in report_page(earlier, Path("report.html"))[0]) != is_valid
@@ -277,7 +277,7 @@ def test_what_is_not_valid_is_stamped_on_screen_and_on_paper(fit: str, evaluated
 
 def test_mistake_is_said_beside_the_verdict(here: Path) -> None:
     Path("scenario.toml").write_text(SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3"))
-    run = sd.simulate_scenario(sd.read_scenario("scenario.toml"))
+    run = sd.simulate(sd.read_scenario("scenario.toml"))
     changed(run, {name: -run.channels[name] for name in ("alpha", "beta")}).write("run.csv")
     for name in ("calibration.nc", "calibration.csv"):
         assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 3
@@ -367,9 +367,9 @@ def test_what_is_not_determined_is_said_where_it_counts(here: Path) -> None:
 
 
 def test_error_in_the_volume_is_that_of_the_volume_command(evaluated: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sd.write_calibration(sd.read_calibration("calibration.nc").judged("accepted", []), "calibration.nc")
+    sd.read_calibration("calibration.nc").judged("accepted", []).write("calibration.nc")
     page = page_of(calibration=Path("calibration.nc"), limit=0.02)
-    found = sd.volume_errors(sd.read_calibration("calibration.nc"))
+    found = sd.volume(sd.read_calibration("calibration.nc"))
     assert main(["volume", "calibration.nc", "--limit", "20", "--json"]) == 0
     assert page.values()["volume"] == json.loads(capsys.readouterr().out.splitlines()[-1]) | {"warnings": []}
     drawn = json.loads(page.scripts["stepdiag-volume"])

@@ -172,7 +172,7 @@ def test_verdict_of_volume_is_the_one_that_the_goal_promises() -> None:
     u = outcome(scenario, own_candidate(scenario.known)).volume
     limit = u * 2.0 * 1.6448536 / 0.2
     assert deciding_goal(limit * 1e3).u == pytest.approx(u, rel=1e-6)
-    found = sd.volume_errors(scenario.machine(), box=[[0.0] * 3, [800.0, 600.0, 500.0]]).largest
+    found = sd.volume(scenario.machine(), box=[[0.0] * 3, [800.0, 600.0, 500.0]]).largest
     verdicts = {}
     for share, expected in ((0.8, "within"), (1.25, "not within")):
         errors = scenario.machine().errors
@@ -184,12 +184,10 @@ def test_verdict_of_volume_is_the_one_that_the_goal_promises() -> None:
         told = []
         for seed in range(20):
             noisy = parse_scenario(NOISY.replace("tilt_urad = 1.0", f"tilt_urad = 1.0\nseed = {seed}"))
-            run = sd.simulate_scenario(noisy, scaled)
+            run = sd.simulate(noisy, scaled)
             known = noisy.known
-            calibration = sd.adjust_scenario(known, run, full_covariance=True).calibration
-            told.append(
-                sd.volume_errors(calibration, limit=limit, between_nodes=0.0, ranking=False, samples=1000).verdict
-            )
+            calibration = sd.methods.adjust_scenario(known, run, full_covariance=True).calibration
+            told.append(sd.volume(calibration, limit=limit, between_nodes=0.0, ranking=False, samples=1000).verdict)
         verdicts[expected] = told.count(expected)
     # With 95 % in each run, 17 or more of 20 have a probability of 0.984.
     assert verdicts["within"] >= 17

@@ -11,7 +11,7 @@ from stepdiag.cli import main
 from stepdiag.parameters import KINDS, kind_of
 from stepdiag.planning.fault_control import extensions, tells_all
 from stepdiag.planning.observation import not_measured, observe
-from stepdiag.report.fault_control import control_rows, extension_rows
+from stepdiag.presentation.fault_control import control_rows, extension_rows
 from stepdiag.scenario.description import Scenario, adjust_scenario, parse_scenario
 from stepdiag.scenario.truth import Truth
 
@@ -61,7 +61,7 @@ def values(adjustment: sd.Adjustment) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("text", [SMALL, FACES], ids=["four body diagonals", "with three face diagonals"])
 def test_what_is_said_of_faults_is_what_adjustments_of_runs_with_them_show(text: str) -> None:
     known = not_measured(parse_scenario(text).known)
-    run = sd.simulate_scenario(Scenario(known, Truth()))
+    run = sd.simulate(Scenario(known, Truth()))
     sound = values(adjust_scenario(known, run))
     everything = faults(run)
     shown, effects, sizes = [], [], []
@@ -153,7 +153,7 @@ def test_faults_must_be_larger_where_all_noise_is() -> None:
     )
     noisy = parse_scenario(text + "[noise]\ndistance_um = 0.4\ntilt_urad = 4.0\nseed = 1\n")
     quiet = parse_scenario(text + "[noise]\ndistance_um = 0.04\ntilt_urad = 0.4\nseed = 1\n")
-    one, other = (adjust_scenario(s, sd.simulate_scenario(s), reliability=True) for s in (quiet, noisy))
+    one, other = (adjust_scenario(s, sd.simulate(s), reliability=True) for s in (quiet, noisy))
     assert one.variance_factor < 1.0
     factors = [component.factor for component in other.variance_components]
     assert factors == pytest.approx([4.0] * 3, rel=0.25)

@@ -11,7 +11,7 @@ import stepdiag as sd
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.cli import main
 from stepdiag.planning.observation import extents, growth, not_measured, observe, prospects
-from stepdiag.report.observation import prospect_csv
+from stepdiag.presentation.observation import prospect_csv
 from stepdiag.scenario.description import Scenario, parse_scenario
 from stepdiag.scenario.truth import Truth
 
@@ -26,10 +26,10 @@ def test_scenario_without_errors_has_the_weights_and_unknowns_of_its_own() -> No
     assert perfect.known.plan.steps == 7
     assert perfect.known.uncertainty.distance == scenario.known.uncertainty.distance == pytest.approx(0.3e-3)
     assert not perfect.machine().error([[80.0, 60.0, 50.0]]).any()
-    run = sd.simulate_scenario(perfect)
+    run = sd.simulate(perfect)
     for angle in (run.channels["alpha"], run.channels["beta"]):
         assert np.max(np.abs(angle)) < 1e-15  # a perfect machine's mirror stands still, to rounding
-    assert {e.prior for e in sd.adjust_scenario(perfect, run).setup if e.quantity == "gain"} == {0.5}
+    assert {e.prior for e in sd.methods.adjust_scenario(perfect, run).setup if e.quantity == "gain"} == {0.5}
 
 
 def test_uncertainties_said_before_are_those_of_an_aligned_run() -> None:
@@ -37,7 +37,7 @@ def test_uncertainties_said_before_are_those_of_an_aligned_run() -> None:
     fixed = '[adjustment]\nroll_urad = "fixed"\ngain = "fixed"\nlateral_mm = "fixed"\n'
     scenario = parse_scenario(SCENARIO.split("[misalignment]")[0] + fixed)
     before = largest_uncertainties(observe(scenario)[1].calibration)
-    after = largest_uncertainties(sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario)))
+    after = largest_uncertainties(sd.methods.evaluate_scenario(scenario, sd.simulate(scenario)))
     for kind, (value, where) in before.items():
         # Errors of 60 µrad and 20 µm change the derivatives by some 1e-4.
         assert after[kind][0] == pytest.approx(value, rel=1e-3)
@@ -132,7 +132,7 @@ def recovered(text: str) -> dict[str, float]:
     """The largest error of each parameter that is determined as a whole, mm or rad, of a run without noise."""
     scenario = parse_scenario(text)
     truth = scenario.machine().errors
-    calibration = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario))
+    calibration = sd.methods.evaluate_scenario(scenario, sd.simulate(scenario))
     whole, _, _ = extents(calibration, scenario.known.plan)
     functions = {name: calibration.functions[name] for name in whole if name in calibration.functions}
     errors = {name: float(np.max(np.abs(v - truth.function(name, p)))) for name, (p, v, _) in functions.items()}

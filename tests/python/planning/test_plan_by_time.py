@@ -30,7 +30,15 @@ from stepdiag.planning.plan_by_time import (
     stated_candidates,
     telling,
 )
-from stepdiag.report.plan_by_time import advice, fault_advice, inputs_row, left_out_rows, plan_csv, plan_rows, shown
+from stepdiag.presentation.plan_by_time import (
+    advice,
+    fault_advice,
+    inputs_row,
+    left_out_rows,
+    plan_csv,
+    plan_rows,
+    shown,
+)
 from stepdiag.scenario.description import Scenario, parse_scenario
 
 FEW = """
@@ -89,7 +97,7 @@ def test_plan_of_the_scenario_has_the_uncertainties_of_its_run() -> None:
     timed = SCENARIO.replace("distance_um = 0.1", "distance_um = 0.0")
     noiseless = parse_scenario(timed.replace("[plan]", f"[plan]\nseconds_per_reading = {between!r}"))
     found = outcome(scenario, Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, 1))
-    expected = largest_uncertainties(sd.evaluate_scenario(scenario, sd.simulate_scenario(noiseless)))
+    expected = largest_uncertainties(sd.methods.evaluate_scenario(scenario, sd.simulate(noiseless)))
     assert found.largest == pytest.approx({kind: value for kind, (value, _) in expected.items()}, rel=1e-9)
     assert len(found.determined) == 21
     assert found.spacing == 16.0
@@ -243,11 +251,11 @@ def test_volume_is_that_of_the_calibration_at_the_worst_point() -> None:
     )
     _, between = measuring_time(scenario.known.plan, times_of(scenario.known.keys.plan_by_time, ""))
     planned = not_measured(scenario.known, {"seconds_per_reading": between})
-    run = sd.simulate_scenario(Scenario(planned, scenario.truth))
-    calibration = sd.adjust_scenario(planned, run, full_covariance=True).calibration
+    run = sd.simulate(Scenario(planned, scenario.truth))
+    calibration = sd.methods.adjust_scenario(planned, run, full_covariance=True).calibration
     axes = [np.linspace(0.0, edge, 5) for edge in (80.0, 60.0, 50.0)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    u = sd.errors_at_points(calibration, points).error_uncertainty
+    u = sd.errors_at(calibration, points).error_uncertainty
     # The machine of the run is another one: errors of 60 µrad change the derivatives by some 1e-4; noise is not in u.
     assert plain.volume == pytest.approx(np.sqrt((u**2).sum(axis=1)).max(), rel=1e-3)
     assert steps.volume < plain.volume

@@ -70,8 +70,8 @@ def test_smallest_change_seen_is_that_of_the_noncentral_distribution(
     scenario: sd.Scenario, baseline: sd.Calibration
 ) -> None:
     """With SciPy's: at the smallest change the test has the stated power."""
-    run = sd.simulate_scenario(scenario)
-    found = sd.recheck_scenario(baseline, scenario, run)
+    run = sd.simulate(scenario)
+    found = sd.recheck(baseline, scenario, run)
     weights = np.array([one.weight for one in found.combinations])
     u = np.array([one.standard_uncertainty for one in found.combinations])
     for alpha, power in ((0.001, 0.95), (0.05, 0.5)):
@@ -85,7 +85,7 @@ def test_smallest_change_seen_is_that_of_the_noncentral_distribution(
 
 def test_shape_is_what_terms_add_to_the_entries(scenario: sd.Scenario, baseline: sd.Calibration) -> None:
     """By the closed forms of docs/verify.md."""
-    found = sd.recheck_scenario(baseline, scenario, sd.simulate_scenario(scenario))
+    found = sd.recheck(baseline, scenario, sd.simulate(scenario))
     for term, added in zip(found.terms, found.shape.T, strict=True):
         for (parameter, position), value in zip(baseline.covariance_labels, added, strict=True):
             share = 0.0 if position is None else position / baseline.volume["XYZ".index(term.parameter[2])]

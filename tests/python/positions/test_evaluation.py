@@ -57,7 +57,7 @@ PUBLISHED = {
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_figures_of_published_readings_are_those_of_the_formulas(name: str) -> None:
-    result = sd.evaluate_positions(sd.read_positions(PUBLISHED_READINGS / f"{name}.csv"))
+    result = sd.positions.evaluate_positions(sd.positions.read_positions(PUBLISHED_READINGS / f"{name}.csv"))
     expected = by_the_formulas(PUBLISHED_READINGS / f"{name}.csv")
     assert result.figures.keys() == expected.keys() == FIGURES.keys()
     for figure, value in result.figures.items():
@@ -69,15 +69,17 @@ def test_figures_of_published_readings_are_those_of_the_formulas(name: str) -> N
 
 
 def test_places_are_those_of_the_extremes() -> None:
-    figures = sd.evaluate_positions(sd.read_positions(PUBLISHED_READINGS / "target_axis.csv")).figures
+    figures = sd.positions.evaluate_positions(
+        sd.positions.read_positions(PUBLISHED_READINGS / "target_axis.csv")
+    ).figures
     assert figures["B"].at == figures["R"].at == (0.0,)
     assert figures["E"].at == figures["M"].at == figures["A"].at == (-10.0, 0.0)
     assert figures["E_up"].at == (-10.0, -20.0)
     assert figures["B_mean"].at == ()
 
 
-def readings_of(values: Readings) -> sd.PositionReadings:
-    return sd.PositionReadings(tuple(sorted({target for target, _, _ in values})), values)
+def readings_of(values: Readings) -> sd.positions.PositionReadings:
+    return sd.positions.PositionReadings(tuple(sorted({target for target, _, _ in values})), values)
 
 
 def random_readings(seed: int, targets: int = 6, cycles: int = 5) -> Readings:
@@ -90,7 +92,8 @@ def random_readings(seed: int, targets: int = 6, cycles: int = 5) -> Readings:
 def test_figures_are_bound_by_each_other(seed: int) -> None:
     """Relations that follow from the definitions, whatever the readings."""
     f = {
-        name: figure.value for name, figure in sd.evaluate_positions(readings_of(random_readings(seed))).figures.items()
+        name: figure.value
+        for name, figure in sd.positions.evaluate_positions(readings_of(random_readings(seed))).figures.items()
     }
     assert max(f["E_up"], f["E_down"]) <= f["E"] <= max(f["E_up"], f["E_down"]) + f["B"]
     assert f["M"] <= f["E"] <= f["M"] + f["B"] + 1e-15
@@ -101,9 +104,9 @@ def test_figures_are_bound_by_each_other(seed: int) -> None:
 
 def test_order_of_readings_and_a_shift_of_all_change_nothing() -> None:
     readings = random_readings(3)
-    one = sd.evaluate_positions(readings_of(readings))
+    one = sd.positions.evaluate_positions(readings_of(readings))
     shifted = {key: value + 0.125 for key, value in reversed(readings.items())}
-    other = sd.evaluate_positions(readings_of(shifted))
+    other = sd.positions.evaluate_positions(readings_of(shifted))
     for name, figure in one.figures.items():
         # Deviations near 0.125 have rounding of 1.4e-17.
         assert other.figures[name].value == pytest.approx(figure.value, abs=1e-15)
@@ -113,7 +116,7 @@ def test_order_of_readings_and_a_shift_of_all_change_nothing() -> None:
 def test_lost_readings_change_the_count_of_their_target_alone() -> None:
     readings = random_readings(4)
     del readings[100.0, "+", 2], readings[100.0, "+", 5]
-    result = sd.evaluate_positions(readings_of(readings))
+    result = sd.positions.evaluate_positions(readings_of(readings))
     (scatter,) = (s for s in result.up if s.target == 100.0)
     kept = [readings[100.0, "+", cycle] for cycle in (1, 3, 4)]
     assert (scatter.count, scatter.mean) == (3, pytest.approx(np.mean(kept), rel=1e-14))
@@ -127,7 +130,7 @@ def test_target_of_one_reading_is_left_out_and_named() -> None:
     for cycle in range(2, 6):
         del readings[200.0, "-", cycle]
     readings[200.0, "-", 1] = 1.0  # would be the largest by far
-    result = sd.evaluate_positions(readings_of(readings))
+    result = sd.positions.evaluate_positions(readings_of(readings))
     assert result.left_out == ((200.0, "-", 1),)
     assert 200.0 not in result.reversal
     assert result.figures["E"].value < 0.01
@@ -136,16 +139,16 @@ def test_target_of_one_reading_is_left_out_and_named() -> None:
 
 def test_readings_of_one_direction_have_its_figures_alone() -> None:
     readings = {key: value for key, value in random_readings(6).items() if key[1] == "-"}
-    result = sd.evaluate_positions(readings_of(readings))
+    result = sd.positions.evaluate_positions(readings_of(readings))
     assert list(result.figures) == ["A_down", "E_down", "R_down"]
-    both = sd.evaluate_positions(readings_of(random_readings(6)))
+    both = sd.positions.evaluate_positions(readings_of(random_readings(6)))
     assert {name: both.figures[name] for name in result.figures} == dict(result.figures)
 
 
 def test_one_cycle_is_refused() -> None:
     readings = {key: value for key, value in random_readings(7).items() if key[2] == 1}
     expected = "expected two or more cycles at two or more targets in one direction"
-    refused(sd.evaluate_positions, readings_of(readings), names=expected)
+    refused(sd.positions.evaluate_positions, readings_of(readings), names=expected)
 
 
 @pytest.mark.parametrize("cycles", [5, 20])
@@ -163,7 +166,7 @@ def test_uncertainties_are_the_scatter_of_repeated_tests(cycles: int) -> None:
             for cycle in range(cycles):
                 values[target, "+", cycle] = up[k] + scatter_up[k] * random.standard_normal()
                 values[target, "-", cycle] = down[k] + scatter_down[k] * random.standard_normal()
-        for name, figure in sd.evaluate_positions(readings_of(values)).figures.items():
+        for name, figure in sd.positions.evaluate_positions(readings_of(values)).figures.items():
             found.setdefault(name, []).append(figure.value)
             assert figure.standard_uncertainty is not None
             stated.setdefault(name, []).append(figure.standard_uncertainty**2)
@@ -175,7 +178,7 @@ def test_uncertainties_are_the_scatter_of_repeated_tests(cycles: int) -> None:
 
 @pytest.mark.parametrize("targets", [(), (0.0,), (1.0, 0.0), (0.0, 0.0)])
 def test_targets_that_do_not_ascend_are_refused(targets: tuple[float, ...]) -> None:
-    refused(sd.PositionReadings, targets, {}, names="targets: expected two or more different ones, ascending")
+    refused(sd.positions.PositionReadings, targets, {}, names="targets: expected two or more different ones, ascending")
 
 
 @pytest.mark.parametrize(
@@ -183,4 +186,4 @@ def test_targets_that_do_not_ascend_are_refused(targets: tuple[float, ...]) -> N
     [((5.0, "+", 1), 0.0), ((0.0, "*", 1), 0.0), ((0.0, "+", 1), math.nan), ((0.0, "+", 1), math.inf)],
 )
 def test_deviations_that_are_none_are_refused(key: tuple[float, str, int], value: float) -> None:
-    refused(sd.PositionReadings, (0.0, 1.0), {key: value}, names="deviations: expected a finite deviation")
+    refused(sd.positions.PositionReadings, (0.0, 1.0), {key: value}, names="deviations: expected a finite deviation")

@@ -37,14 +37,14 @@ def synthetic(
     )
 
 
-def values_of(line: sd.PredictedPositions) -> dict[str, float]:
+def values_of(line: sd.positions.PredictedPositions) -> dict[str, float]:
     return {name: figure.value for name, figure in line.figures.items()}
 
 
 # --- closed forms ----------------------------------------------------------------------------------------------------
 def test_axis_has_the_range_of_its_positioning_error() -> None:
     calibration = synthetic({"EXX": (0.0, 4e-3, -1e-3, 2e-3, 1e-3)})
-    line = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"))
+    line = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X"))
     np.testing.assert_allclose(line.up, [0.0, 4e-3, -1e-3, 2e-3, 1e-3], atol=1e-14)
     assert line.figures["E_up"].value == pytest.approx(5e-3, abs=1e-14)
     assert line.figures["E_up"].at == (20.0, 40.0)
@@ -56,9 +56,13 @@ def test_yaw_adds_its_lever_off_the_axis() -> None:
     """X carries the workpiece: at y, ECX of the table moves the tool relative to it by -y ECX along X."""
     calibration = synthetic({"ECX": (0.0, 20e-6)})
     for y in (0.0, 25.0, 60.0):
-        line = sd.predict_positions(calibration, *sd.axis_line(calibration, "X", (0.0, y, 0.0)), points=2)
+        line = sd.positions.predict_positions(
+            calibration, *sd.positions.axis_line(calibration, "X", (0.0, y, 0.0)), points=2
+        )
         assert line.up[-1] == pytest.approx(-y * 20e-6, abs=SECOND_ORDER)
-    tool = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"), points=2, tool=(0.0, 100.0, 0.0))
+    tool = sd.positions.predict_positions(
+        calibration, *sd.positions.axis_line(calibration, "X"), points=2, tool=(0.0, 100.0, 0.0)
+    )
     assert tool.up[-1] == pytest.approx(-100.0 * 20e-6, abs=SECOND_ORDER)
 
 
@@ -68,10 +72,10 @@ def test_squareness_lengthens_one_diagonal_and_shortens_the_other() -> None:
     x, y, _ = VOLUME
     expected = 50e-6 * x * y / np.hypot(x, y)
     for name, sign in (("pp0", -1.0), ("np0", 1.0)):
-        line = sd.predict_positions(calibration, *sd.diagonal_line(calibration, name), points=5)
+        line = sd.positions.predict_positions(calibration, *sd.positions.diagonal_line(calibration, name), points=5)
         np.testing.assert_allclose(line.up, sign * expected * np.linspace(0.0, 1.0, 5), atol=SECOND_ORDER)
     for axis in "XYZ":
-        line = sd.predict_positions(calibration, *sd.axis_line(calibration, axis))
+        line = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, axis))
         np.testing.assert_allclose(line.up, 0.0, atol=SECOND_ORDER)
 
 
@@ -82,7 +86,7 @@ def directional(**tables: tuple[float, ...]) -> sd.Calibration:
 
 def test_constant_reversal_is_b_and_changes_no_range_of_one_direction() -> None:
     calibration = directional(EXX=(2e-3, 2e-3, 2e-3))
-    line = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"))
+    line = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X"))
     expected = {"B": 2e-3, "B_mean": 2e-3, "E_up": 3e-3, "E_down": 3e-3, "M": 3e-3, "E": 5e-3}
     assert values_of(line) == pytest.approx(expected, abs=1e-14)
     # Standard uncertainty of a table value alone: 10 nm.
@@ -93,8 +97,8 @@ def test_constant_reversal_is_b_and_changes_no_range_of_one_direction() -> None:
 def test_reversal_along_a_line_that_falls_is_of_the_other_sign() -> None:
     """Along n00, up is approached in - direction of X: x↑ - x↓ = -(minus - plus) d."""
     calibration = directional(EXX=(2e-3, 2e-3, 2e-3))
-    rising = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"))
-    falling = sd.predict_positions(calibration, *reversed(sd.axis_line(calibration, "X")))
+    rising = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X"))
+    falling = sd.positions.predict_positions(calibration, *reversed(sd.positions.axis_line(calibration, "X")))
     np.testing.assert_allclose(falling.reversal, 2e-3, atol=1e-14)
     assert values_of(falling) == pytest.approx(values_of(rising), abs=1e-14)
     assert falling.figures["E_up"].interval is None
@@ -108,7 +112,7 @@ def test_figures_of_simulated_repeated_readings_are_those_predicted() -> None:
     calibration = synthetic(functions, {"C0Y": 2e-5, "A0Z": -3e-5}, reversal, tool=TOOL)
     machine = sd.Machine(CHAIN, calibration.to_error_map(), TOOL)
     start, end = np.array([70.0, 10.0, 5.0]), np.array([15.0, 55.0, 5.0])
-    line = sd.predict_positions(calibration, tuple(start), tuple(end), points=7)
+    line = sd.positions.predict_positions(calibration, tuple(start), tuple(end), points=7)
     deviations = {}
     zero = start + np.array(TOOL) + machine.error(start[None], "-++")[0]
     length, d = np.linalg.norm(end - start), (end - start) / np.linalg.norm(end - start)
@@ -118,8 +122,8 @@ def test_figures_of_simulated_repeated_readings_are_those_predicted() -> None:
             actual = commanded + np.array(TOOL) + machine.error(commanded[None], approach)[0]
             for cycle in (1, 2):
                 deviations[float(share * length), direction, cycle] = float((actual - zero) @ d - share * length)
-    readings = sd.PositionReadings(tuple(sorted({key[0] for key in deviations})), deviations)
-    measured = {name: figure.value for name, figure in sd.evaluate_positions(readings).figures.items()}
+    readings = sd.positions.PositionReadings(tuple(sorted({key[0] for key in deviations})), deviations)
+    measured = {name: figure.value for name, figure in sd.positions.evaluate_positions(readings).figures.items()}
     predicted = values_of(line)
     assert predicted.keys() == {"E", "E_up", "E_down", "M", "B", "B_mean"}
     for name, value in predicted.items():
@@ -135,18 +139,18 @@ def calibration() -> sd.Calibration:
 @pytest.fixture(scope="module")
 def of_both_directions() -> sd.Calibration:
     run = simulate(1, repeats=2, backward=True)
-    return sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
+    return sd.methods.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
 
 
 @pytest.mark.parametrize("name", ["ppp", "npp", "pnp", "nnp"])
 def test_body_diagonals_are_those_of_diagonal_errors(calibration: sd.Calibration, name: str) -> None:
-    line = sd.predict_positions(calibration, *sd.diagonal_line(calibration, name))
-    derived = sd.diagonal_errors(calibration)[name]
+    line = sd.positions.predict_positions(calibration, *sd.positions.diagonal_line(calibration, name))
+    derived = sd.methods.diagonal_errors(calibration)[name]
     np.testing.assert_allclose(line.target, derived.travel, rtol=1e-14)
     # First order there, the exact pose here: 60 µrad of 60 µm.
     np.testing.assert_allclose(line.up, derived.value, atol=2e-5)
     np.testing.assert_allclose(line.up_standard_uncertainty, derived.standard_uncertainty, rtol=1e-9, atol=1e-15)
-    accuracy = sd.volumetric_accuracy(calibration)
+    accuracy = sd._core.volumetric_accuracy(calibration)
     k = accuracy.names.index(f"E_D {name}")
     figure = line.figures["E_up"]
     assert figure.value == pytest.approx(derived.range, abs=2e-5)
@@ -159,7 +163,7 @@ def test_body_diagonals_are_those_of_diagonal_errors(calibration: sd.Calibration
 
 def test_values_are_those_of_the_exact_pose(calibration: sd.Calibration) -> None:
     start, end = (5.0, 50.0, 10.0), (75.0, 20.0, 45.0)
-    line = sd.predict_positions(calibration, start, end, points=9, tool=(0.0, 0.0, -120.0))
+    line = sd.positions.predict_positions(calibration, start, end, points=9, tool=(0.0, 0.0, -120.0))
     machine = sd.Machine(CHAIN, calibration.to_error_map(), (0.0, 0.0, -120.0))
     share = np.linspace(0.0, 1.0, 9)[:, None]
     error = machine.error(np.array(start) + share * (np.array(end) - np.array(start)))
@@ -170,7 +174,11 @@ def test_values_are_those_of_the_exact_pose(calibration: sd.Calibration) -> None
 @pytest.mark.slow
 def test_interval_covers_the_true_range(calibration: sd.Calibration) -> None:
     """The calibration taken as the truth, and 600 calibrations drawn about it with its covariance."""
-    truth = sd.predict_positions(calibration, *sd.axis_line(calibration, "Y", (0.0, 0.0, 50.0))).figures["E_up"].value
+    truth = (
+        sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "Y", (0.0, 0.0, 50.0)))
+        .figures["E_up"]
+        .value
+    )
     assert calibration.covariance is not None
     labels = calibration.covariance_labels
     variances, vectors = np.linalg.eigh(calibration.covariance)
@@ -187,7 +195,11 @@ def test_interval_covers_the_true_range(calibration: sd.Calibration) -> None:
             for name, (value, u) in calibration.squareness.items()
         }
         drawn = sd.Calibration("drawn", CHAIN, VOLUME, TOOL, functions, squareness, covariance=calibration.covariance)
-        found = sd.predict_positions(drawn, *sd.axis_line(drawn, "Y", (0.0, 0.0, 50.0))).figures["E_up"].interval
+        found = (
+            sd.positions.predict_positions(drawn, *sd.positions.axis_line(drawn, "Y", (0.0, 0.0, 50.0)))
+            .figures["E_up"]
+            .interval
+        )
         assert found is not None
         covered += found[0] <= truth <= found[1]
     # Binomial, 600 of 0.95: 570 with a standard deviation of 5.3; four of them.
@@ -200,11 +212,14 @@ def test_calibrations_of_a_known_machine_predict_its_ranges() -> None:
     covered = 0
     for seed in range(40):
         found = calibrate(seed, full_covariance=True)
-        for start, end in (sd.axis_line(found, "X", (0.0, 60.0, 50.0)), sd.diagonal_line(found, "pnp")):
+        for start, end in (
+            sd.positions.axis_line(found, "X", (0.0, 60.0, 50.0)),
+            sd.positions.diagonal_line(found, "pnp"),
+        ):
             points = np.array(start) + np.linspace(0.0, 1.0, 6)[:, None] * (np.array(end) - np.array(start))
             direction = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
             truth = np.ptp(machine.error(points) @ direction)
-            interval = sd.predict_positions(found, start, end).figures["E_up"].interval
+            interval = sd.positions.predict_positions(found, start, end).figures["E_up"].interval
             assert interval is not None
             covered += interval[0] <= truth <= interval[1]
     # Binomial, 80 of 0.95: 76 with a standard deviation of 2; four of them. Priors of the set-up may make it more.
@@ -219,9 +234,9 @@ def test_backlash_of_a_known_machine_is_the_b_that_is_predicted() -> None:
     machine = sd.Machine(CHAIN, sd.ErrorMap(errors.functions, errors.squareness, negative_functions=negative), TOOL)
     noise = sd.Noise(distance=1e-4, tilt=1e-6, seed=1)
     run = sd.simulate(machine, small_plan(), sd.Head(), noise=noise, repeats=2, backward=True)
-    found = sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL)
+    found = sd.methods.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL)
     for y in (0.0, 60.0):
-        line = sd.predict_positions(found, *sd.axis_line(found, "X", (0.0, y, 0.0)))
+        line = sd.positions.predict_positions(found, *sd.positions.axis_line(found, "X", (0.0, y, 0.0)))
         truth = 2e-3 - (y + TOOL[1]) * 20e-6
         deviations = (line.reversal - truth) / line.reversal_standard_uncertainty
         assert np.max(np.abs(deviations)) < 4.0  # six values, at most 4 u
@@ -231,23 +246,25 @@ def test_backlash_of_a_known_machine_is_the_b_that_is_predicted() -> None:
 # --- what is not known ------------------------------------------------------------------------------------------------
 def test_missing_scale_is_named_and_nothing_is_predicted_from_it() -> None:
     calibration = synthetic({}, undetermined_slopes=["EXX"])
-    along_x = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"))
+    along_x = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X"))
     assert not along_x.figures
     assert np.isnan(along_x.up).all()
     assert along_x.reasons[0] == "not predicted: slope of EXX not determined"
-    assert "E_up" in sd.predict_positions(calibration, *sd.axis_line(calibration, "Y")).figures
+    assert "E_up" in sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "Y")).figures
 
 
 def test_missing_function_counts_where_it_acts_alone() -> None:
     whole = synthetic({})
     functions = {name: table for name, table in whole.functions.items() if name not in ("EXY", "ECX")}
     part = sd.Calibration("by hand", CHAIN, VOLUME, NOTHING, functions, whole.squareness)
-    assert "E_up" in sd.predict_positions(part, *sd.axis_line(part, "X")).figures  # no lever for ECX, EXY stays
-    off_axis = sd.predict_positions(part, *sd.axis_line(part, "X", (0.0, 60.0, 0.0)))
+    assert (
+        "E_up" in sd.positions.predict_positions(part, *sd.positions.axis_line(part, "X")).figures
+    )  # no lever for ECX, EXY stays
+    off_axis = sd.positions.predict_positions(part, *sd.positions.axis_line(part, "X", (0.0, 60.0, 0.0)))
     assert off_axis.reasons[0] == "not predicted: ECX not determined"
     # ECX turns the line pp0 through home about its start, and changes no length on it; np0 does not go through home.
     for name, missing in (("pp0", "EXY"), ("np0", "ECX, EXY")):
-        diagonal = sd.predict_positions(part, *sd.diagonal_line(part, name))
+        diagonal = sd.positions.predict_positions(part, *sd.positions.diagonal_line(part, name))
         assert diagonal.reasons[0] == f"not predicted: {missing} not determined"
 
 
@@ -255,9 +272,11 @@ def test_unknown_constants_of_reversal_leave_b_open_but_not_the_range_of_a_direc
     of_both_directions: sd.Calibration,
 ) -> None:
     """This run leaves the reversal of straightnesses open but for a constant: it acts on diagonals, not on axes."""
-    along_x = sd.predict_positions(of_both_directions, *sd.axis_line(of_both_directions, "X"))
+    along_x = sd.positions.predict_positions(of_both_directions, *sd.positions.axis_line(of_both_directions, "X"))
     assert {"B", "M", "E", "E_down"} <= along_x.figures.keys()
-    diagonal = sd.predict_positions(of_both_directions, *sd.diagonal_line(of_both_directions, "ppp"))
+    diagonal = sd.positions.predict_positions(
+        of_both_directions, *sd.positions.diagonal_line(of_both_directions, "ppp")
+    )
     assert list(diagonal.figures) == ["E_up", "E_down"]
     assert any("EYX, EZX" in reason and "known but for a constant" in reason for reason in diagonal.reasons)
 
@@ -266,17 +285,19 @@ def test_unknown_constant_of_a_rotation_leaves_the_direction_open_in_which_it_ac
     """EAY acts along d in the plane YZ by its lever z, which changes along the line; - tables are those that fall."""
     none = dict.fromkeys(FUNCTIONS, (0.0, 0.0))
     calibration = synthetic({}, reversal=none, undetermined_reversal_constants=["EAY"])
-    start, end = sd.diagonal_line(calibration, "0pp")
-    rising, falling = (sd.predict_positions(calibration, *ends) for ends in ((start, end), (end, start)))
+    start, end = sd.positions.diagonal_line(calibration, "0pp")
+    rising, falling = (sd.positions.predict_positions(calibration, *ends) for ends in ((start, end), (end, start)))
     assert (list(rising.figures), list(falling.figures)) == (["E_up"], ["E_down"])
     assert rising.reasons[0].startswith("B, M, E↓ and the bidirectional E are not predicted: the reversal error of EAY")
     assert falling.reasons[0].startswith("B, M, E↑ and the bidirectional E are not predicted")
     # At one place of Y and Z the lever is the same all along X.
-    assert "B" in sd.predict_positions(calibration, *sd.axis_line(calibration, "X")).figures
+    assert "B" in sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X")).figures
 
 
 def test_reversal_is_uncertain_as_its_table_says(of_both_directions: sd.Calibration) -> None:
-    line = sd.predict_positions(of_both_directions, *sd.axis_line(of_both_directions, "X", (0.0, 0.0, 0.0)))
+    line = sd.positions.predict_positions(
+        of_both_directions, *sd.positions.axis_line(of_both_directions, "X", (0.0, 0.0, 0.0))
+    )
     position, value, u = of_both_directions.reversal["EXX"]
     lever = TOOL[1]  # of ECX, and TOOL[2] of EBX
     yaw, pitch = of_both_directions.reversal["ECX"], of_both_directions.reversal["EBX"]
@@ -288,7 +309,7 @@ def test_reversal_is_uncertain_as_its_table_says(of_both_directions: sd.Calibrat
 
 
 def test_calibration_without_covariance_has_values_and_no_interval() -> None:
-    line = sd.predict_positions(synthetic({}), NOTHING, VOLUME)
+    line = sd.positions.predict_positions(synthetic({}), NOTHING, VOLUME)
     assert line.figures["E_up"].interval is None
     assert np.isnan(line.up_standard_uncertainty).all()
     assert any("no covariance" in reason for reason in line.reasons)
@@ -305,11 +326,11 @@ def test_calibration_without_covariance_has_values_and_no_interval() -> None:
     ],
 )
 def test_lines_that_are_none_are_refused(start: Any, end: Any, points: int, message: str) -> None:
-    refused(sd.predict_positions, synthetic({}), start, end, points=points, names=message)
+    refused(sd.positions.predict_positions, synthetic({}), start, end, points=points, names=message)
 
 
 def test_names_of_lines_that_are_none_are_refused() -> None:
     calibration = synthetic({})
-    refused(sd.axis_line, calibration, "x", names="`axis`: expected X, Y or Z, got 'x'")
+    refused(sd.positions.axis_line, calibration, "x", names="`axis`: expected X, Y or Z, got 'x'")
     for name in ("p00", "pp", "ppx"):
-        refused(sd.diagonal_line, calibration, name, names="`diagonal`: expected a body or face diagonal")
+        refused(sd.positions.diagonal_line, calibration, name, names="`diagonal`: expected a body or face diagonal")

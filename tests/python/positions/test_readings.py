@@ -17,8 +17,8 @@ def written(tmp_path: Path, text: str) -> Path:
     return file
 
 
-def read(tmp_path: Path, text: str) -> sd.PositionReadings:
-    return sd.read_positions(written(tmp_path, text))
+def read(tmp_path: Path, text: str) -> sd.positions.PositionReadings:
+    return sd.positions.read_positions(written(tmp_path, text))
 
 
 def test_deviations_come_in_mm_and_a_lost_reading_is_data(tmp_path: Path) -> None:
@@ -65,9 +65,9 @@ MALFORMED = [
 @pytest.mark.parametrize(("text", "message"), MALFORMED)
 def test_mistakes_are_named_by_file_and_line(text: str, message: str, tmp_path: Path) -> None:
     file = written(tmp_path, text)
-    refused(sd.read_positions, file, names=message)
-    refused(sd.read_positions, file, names=str(file))
+    refused(sd.positions.read_positions, file, names=message)
+    refused(sd.positions.read_positions, file, names=str(file))
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    refused(sd.read_positions, tmp_path / "none.csv", names="none.csv: cannot be read")
+    refused(sd.positions.read_positions, tmp_path / "none.csv", names="none.csv: cannot be read")

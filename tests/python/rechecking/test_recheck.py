@@ -1,4 +1,4 @@
-"""Has the machine changed: `recheck_scenario` and `stepdiag recheck`."""
+"""Has the machine changed: `recheck` and `stepdiag recheck`."""
 
 from pathlib import Path
 
@@ -95,7 +95,7 @@ def test_object_has_what_the_report_has(folder: Path, capsys: pytest.CaptureFixt
     words = ["calibration.nc", "short.toml", "hit.csv", "--update", "updated.nc"]
     result = printed("recheck", capsys, "recheck", *words, status=3)
     baseline, run = sd.read_calibration("calibration.nc"), sd.read_measurement("hit.csv")
-    found = sd.recheck_scenario(baseline, sd.read_scenario("short.toml"), run)
+    found = sd.recheck(baseline, sd.read_scenario("short.toml"), run)
     assert (result["changed"], result["explained"], result["updated"]) == (True, True, "updated.nc")
     assert result["chi_square"] == found.chi_square
     by_name = {term.parameter: term for term in found.terms}
@@ -109,7 +109,7 @@ def test_object_has_what_the_report_has(folder: Path, capsys: pytest.CaptureFixt
 def test_what_priors_rule_out_is_no_change(folder: Path) -> None:
     Path("rigid.toml").write_text(SHORT + "[change]\nsquareness_urad = 0\n")
     baseline, run = sd.read_calibration("calibration.nc"), sd.read_measurement("hit.csv")
-    found = sd.recheck_scenario(baseline, sd.read_scenario("rigid.toml"), run)
+    found = sd.recheck(baseline, sd.read_scenario("rigid.toml"), run)
     assert "C0Y" not in {term.parameter for term in found.terms}
     judged = Judged(found, baseline, 0.001)
     assert not judged.is_explained
@@ -120,7 +120,7 @@ def test_one_diagonal_tells_one_number_of_scales_and_squarenesses(folder: Path) 
     Path("one.toml").write_text(SHORT.replace(LINES, 'lines = ["ppp"]\n'))
     assert main(["simulate", "one.toml", "-o", "one.csv"]) == 0
     baseline = sd.read_calibration("calibration.nc")
-    found = sd.recheck_scenario(baseline, sd.read_scenario("one.toml"), sd.read_measurement("one.csv"))
+    found = sd.recheck(baseline, sd.read_scenario("one.toml"), sd.read_measurement("one.csv"))
     lengths = [term.kind in ("scale", "squareness") for term in found.terms]
     assert all(term.told < 0.9 for term, is_length in zip(found.terms, lengths, strict=True) if is_length)
     mostly = [sum(np.array(one.weight)[lengths] ** 2) > 0.5 for one in found.combinations]
@@ -130,11 +130,11 @@ def test_one_diagonal_tells_one_number_of_scales_and_squarenesses(folder: Path) 
 def test_hidden_change_is_that_of_the_priors_where_nothing_is_told(folder: Path) -> None:
     """By the closed form: at the far corner a squareness moves the tool by the travel, a scale likewise."""
     baseline = sd.read_calibration("calibration.nc")
-    priors = sd.ChangePriors(scale=0.0, bow=0.0, slope=0.0, squareness=50e-6)
+    priors = sd.methods.ChangePriors(scale=0.0, bow=0.0, slope=0.0, squareness=50e-6)
     known = sd.read_scenario("short.toml").known
     plan = sd.Plan((400.0, 300.0, 250.0), ["p00"], 3)
     run = sd.simulate(sd.Machine(known.chain, sd.ErrorMap({}, {})), plan, sd.Head(), noise=sd.Noise(distance=1e-4))
-    found = sd.recheck(baseline, run, plan, sd.Head(), known.chain, priors=priors)
+    found = sd.methods.recheck(baseline, run, plan, sd.Head(), known.chain, priors=priors)
     assert all(term.told < 0.1 for term in found.terms)
     expected = 2.0 * 50e-6 * np.sqrt(300.0**2 + 2.0 * 250.0**2)
     assert Judged(found, baseline, 0.001).hidden == pytest.approx(expected, rel=1e-3)
@@ -147,7 +147,7 @@ def test_what_cannot_be_rechecked_is_refused(folder: Path, capsys: pytest.Captur
         SHORT + "[change]\nsquareness_urad = 0\nscale_um_per_m = 0\nbow_um = 0\nslope_urad = 0\n"
     )
     baseline, run = sd.read_calibration("calibration.nc"), sd.read_measurement("same.csv")
-    refused(sd.recheck_scenario, baseline, sd.read_scenario("none.toml"), run, names="one kind of change")
+    refused(sd.recheck, baseline, sd.read_scenario("none.toml"), run, names="one kind of change")
 
 
 @pytest.mark.parametrize("seed", [14, 36, 54])
@@ -158,10 +158,10 @@ def test_machine_that_has_changed_in_all_ways_is_told_as_such(seed: int) -> None
     machine = rechecked.changed_machine(drawn, rechecked.random_change(rng))
     run = rechecked.read_again(drawn, machine, plan, rng)
     given = (baseline, run, plan, drawn.head, sd.Chain(drawn.chain), machine.tool)
-    found = sd.recheck(*given, options=rechecked.options(drawn))
+    found = sd.methods.recheck(*given, options=rechecked.options(drawn))
     assert found.probability < 1e-12
     assert found.fit_probability > 1e-6
-    assert sd.verify(*given, options=rechecked.options(drawn)).probability < 1e-12
+    assert sd.methods.verify(*given, options=rechecked.options(drawn)).probability < 1e-12
 
 
 def with_wrong_distance(run: sd.Measurement, row: int, wrong: float) -> sd.Measurement:
@@ -224,8 +224,8 @@ def test_whatever_happened_is_judged(event: str, layout: str) -> None:
     """No calibration near the baseline explains most of these; the run is judged all the same."""
     for seed in range(4):
         one = rechecked.after(event, layout, seed)
-        judged = Judged(sd.recheck(*one.given, options=one.options), one.baseline, ALPHA)
-        verified = sd.verify(*one.given, options=one.options)
+        judged = Judged(sd.methods.recheck(*one.given, options=one.options), one.baseline, ALPHA)
+        verified = sd.methods.verify(*one.given, options=one.options)
         if event == "nothing":
             assert judged.is_sound
             assert verified.probability >= ALPHA
@@ -248,7 +248,7 @@ def test_fit_refuses_as_many_unchanged_machines_as_it_says() -> None:
         plan = rechecked.short_plan(drawn, seed, 4)
         run = rechecked.read_again(drawn, drawn.machine, plan, rng)
         given = (baseline, run, plan, drawn.head, sd.Chain(drawn.chain), drawn.machine.tool)
-        probabilities.append(sd.recheck(*given, options=rechecked.options(drawn)).fit_probability)
+        probabilities.append(sd.methods.recheck(*given, options=rechecked.options(drawn)).fit_probability)
     refused_share = np.mean(np.array(probabilities) < 0.05)
     assert abs(refused_share - 0.05) < 4.0 * np.sqrt(0.05 * 0.95 / len(probabilities))
 
@@ -257,7 +257,7 @@ def test_square_sum_of_the_fit_is_that_of_generalised_least_squares(folder: Path
     """An oracle that shares nothing with the solution: dense, derivatives by differences of `simulate`."""
     baseline, scenario = sd.read_calibration("calibration.nc"), sd.read_scenario("short.toml")
     run, known = sd.read_measurement("same.csv"), scenario.known
-    found = sd.recheck_scenario(baseline, scenario, run)
+    found = sd.recheck(baseline, scenario, run)
     labels, lines = baseline.covariance_labels, ("ppp", "npp", "pnp", "nnp")
 
     def read(change: np.ndarray, setups: np.ndarray) -> np.ndarray:
@@ -321,19 +321,19 @@ def test_readings_of_a_billionth_of_their_distance_are_judged(size: float, noise
         drawn = sd.Noise(distance=times * noise, tilt=times * tilt, seed=1)
         return sd.simulate(sd.Machine(chain, hit), plan, head, noise=drawn)
 
-    def known_to(times: float) -> sd.AdjustmentOptions:
-        return sd.AdjustmentOptions(
-            uncertainty=sd.ReadingUncertainty(distance=times * noise, tilt=times * tilt), full_covariance=True
+    def known_to(times: float) -> sd.methods.AdjustmentOptions:
+        return sd.methods.AdjustmentOptions(
+            uncertainty=sd.methods.ReadingUncertainty(distance=times * noise, tilt=times * tilt), full_covariance=True
         )
 
     plan = sd.Plan(volume, DIAGONALS, 6, scale_lines=SCALE_LINES)
-    found = sd.adjust(read(0.0, plan, 0.0), plan, head, chain, options=known_to(coarse)).calibration
+    found = sd.methods.adjust(read(0.0, plan, 0.0), plan, head, chain, options=known_to(coarse)).calibration
     assert found.covariance is not None
     baseline = with_covariance(found, found.covariance / coarse**2)
     short = sd.Plan(volume, DIAGONALS, 3)
 
-    def rechecked_run(run: sd.Measurement) -> sd.Recheck:
-        return sd.recheck(baseline, run, short, head, chain, options=known_to(1.0))
+    def rechecked_run(run: sd.Measurement) -> sd.results.Recheck:
+        return sd.methods.recheck(baseline, run, short, head, chain, options=known_to(1.0))
 
     same = rechecked_run(read(0.0, short, 1.0))
     assert min(same.probability, same.fit_probability) > 1e-3

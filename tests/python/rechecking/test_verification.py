@@ -78,7 +78,7 @@ def test_machine_that_was_hit_is_noticed(files: Path, capsys: pytest.CaptureFixt
     parts = parts_of(sd.read_calibration("calibration.nc"))
     value, uncertainty = parts["squareness"]["C0Y"]
     parts["squareness"] |= {"C0Y": (value + 30e-6, uncertainty)}
-    sd.write_calibration(sd.Calibration(**parts), "hit.nc")
+    sd.Calibration(**parts).write("hit.nc")
     capsys.readouterr()
     assert main(["verify", "hit.nc", "tested.toml", "new.csv"]) == 3
     captured = capsys.readouterr()
@@ -89,7 +89,7 @@ def test_machine_that_was_hit_is_noticed(files: Path, capsys: pytest.CaptureFixt
 def test_object_has_what_the_report_has(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = printed("verification", capsys, "verify", "calibration.nc", "tested.toml", "new.csv")
     scenario = sd.read_scenario("tested.toml")
-    found = sd.verify_scenario(sd.read_calibration("calibration.nc"), scenario, sd.read_measurement("new.csv"))
+    found = sd.verify(sd.read_calibration("calibration.nc"), scenario, sd.read_measurement("new.csv"))
     assert result["chi_square"] == found.chi_square
     assert [line["deviation_um"] for line in result["lines"]] == pytest.approx(
         [1e3 * line.deviation for line in found.lines]
@@ -142,7 +142,7 @@ def test_deviations_follow_from_derivatives_of_the_simulator(files: Path) -> Non
         normal = by_setup.T @ weight @ by_setup + prior
         setups = setups + np.linalg.solve(normal, by_setup.T @ weight @ residual - prior @ setups)
     residual = values - read(zero, setups)
-    found = sd.verify_scenario(calibration, scenario, run)
+    found = sd.verify(calibration, scenario, run)
     # Residuals are exact to differences of derivatives; chi-square to those of the machine's second order.
     assert found.chi_square == pytest.approx(residual @ weight @ residual + setups @ prior @ setups, rel=1e-3)
     deviations = np.concatenate([found.deviations[c] for c in ("distance", "alpha", "beta")])
@@ -176,7 +176,7 @@ def test_what_cannot_be_verified_is_refused(
 
 
 def test_calibration_without_angles_is_refused_by_name(files: Path) -> None:
-    calibration = sd.evaluate(
+    calibration = sd.methods.evaluate(
         sd.read_measurement("run.csv"),
         sd.read_scenario("calibrated.toml").known.plan,
         sd.Head(),
@@ -184,7 +184,7 @@ def test_calibration_without_angles_is_refused_by_name(files: Path) -> None:
         method="conventional",
     )
     refused(
-        sd.verify_scenario,
+        sd.verify,
         calibration,
         sd.read_scenario("tested.toml"),
         sd.read_measurement("new.csv"),

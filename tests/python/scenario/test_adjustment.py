@@ -17,7 +17,7 @@ BEAMS = SCENARIO.replace('"ideal"', '"multi_beam"\nbeam_offsets_mm = [[0, 0], [2
 
 def adjusted(text: str) -> sd.Adjustment:
     scenario = parse_scenario(text)
-    return sd.adjust_scenario(scenario, sd.simulate_scenario(scenario))
+    return sd.methods.adjust_scenario(scenario, sd.simulate(scenario))
 
 
 def priors(text: str, line: str) -> dict[str, float]:
@@ -157,11 +157,11 @@ ORDERS = SCENARIO.replace("steps = 5", 'steps = 5\norder = ["XYZ", "YZX"]')
 
 def test_runs_of_several_orders_are_simulated_and_evaluated() -> None:
     scenario = parse_scenario(ORDERS.split("[noise]")[0])
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     assert sorted(set(run.run.tolist())) == [0, 1]
     second = (run.run == 1) & (np.array(run.line) == "ppp")
     assert run.position[second].tolist() == scenario.known.plan.points("ppp", 1).tolist()
-    largest = sd.largest_deviations(sd.evaluate_scenario(scenario, run), scenario.machine().errors)
+    largest = sd.largest_deviations(sd.methods.evaluate_scenario(scenario, run), scenario.machine().errors)
     # The floor of double precision at distances of half a metre is some 1e-12 mm; scale lines are of two orders too.
     assert abs(largest["positioning"].value) < 1e-10
 
@@ -169,7 +169,7 @@ def test_runs_of_several_orders_are_simulated_and_evaluated() -> None:
 def test_backward_run_goes_the_way_of_its_forward_run() -> None:
     scenario = parse_scenario(ORDERS.replace("[plan]", "[plan]\nbackward = true"))
     assert scenario.known.plan.orders == ["XYZ", "XYZ", "YZX", "YZX"]
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     assert sorted(set(run.run.tolist())) == [0, 1, 2, 3]
     of_line = np.array(run.line) == "ppp"
     there, back = (run.position[of_line & (run.run == number)] for number in (2, 3))

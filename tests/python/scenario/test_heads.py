@@ -43,7 +43,7 @@ BLIND = PSD.replace("[machine.random]\nseed = 7\n", "")
 
 
 def run_of(text: str, path: str | Path = "scenario.toml") -> sd.Measurement:
-    return sd.simulate_scenario(parse_scenario(text, path))
+    return sd.simulate(parse_scenario(text, path))
 
 
 # --- which head ------------------------------------------------------------------------------------------------------
@@ -61,7 +61,7 @@ def test_description_of_ones_own_is_found_beside_the_scenario(tmp_path: Path) ->
     (tmp_path / "mine.toml").write_text(find_head("three_beams").read_text())
     file = tmp_path / "scenario.toml"
     file.write_text(BEAMS.replace('"three_beams"', '"mine.toml"'))
-    ours, theirs = sd.simulate_scenario(sd.read_scenario(file)), run_of(BEAMS)
+    ours, theirs = sd.simulate(sd.read_scenario(file)), run_of(BEAMS)
     assert all(ours.channels[name].tobytes() == theirs.channels[name].tobytes() for name in theirs.channels)
 
 
@@ -207,9 +207,9 @@ def test_calibration_has_the_same_bits_when_the_truth_is_deleted(head: str, meth
         parse_scenario(text.replace("beam_and_psd", head) + any_machine)
         for text in (PSD.rstrip() + "\n" + truth, BLIND.rstrip() + "\n")
     )
-    run = sd.simulate_scenario(seeing)
+    run = sd.simulate(seeing)
     assert not any(np.isnan(values).any() for values in run.channels.values())
-    one, other = (sd.evaluate_scenario(scenario, run, method=method) for scenario in (seeing, blind))  # type: ignore[arg-type]
+    one, other = (sd.methods.evaluate_scenario(scenario, run, method=method) for scenario in (seeing, blind))  # type: ignore[arg-type]
     assert one.functions.keys() == other.functions.keys()
     for name in one.functions:
         for mine, theirs in zip(one.functions[name], other.functions[name], strict=True):
@@ -233,11 +233,11 @@ def test_evaluation_without_tilts_does_not_look_at_those_of_a_run() -> None:
     whole = run_of(PLAIN)
     assert empty_sheet(scenario.known.plan, scenario.known.signals).channels.keys() == {"distance"}
     with pytest.raises(sd.InvalidArgument, match="nothing can be determined"):
-        sd.evaluate_scenario(scenario, whole, method="enhanced")
-    calibration = sd.evaluate_scenario(scenario, whole, method="conventional")
+        sd.methods.evaluate_scenario(scenario, whole, method="enhanced")
+    calibration = sd.methods.evaluate_scenario(scenario, whole, method="conventional")
     assert (
         calibration.functions.keys()
-        == sd.evaluate_scenario(parse_scenario(PLAIN), whole, method="conventional").functions.keys()
+        == sd.methods.evaluate_scenario(parse_scenario(PLAIN), whole, method="conventional").functions.keys()
     )
 
 

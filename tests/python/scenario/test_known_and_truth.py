@@ -123,10 +123,10 @@ def same_bits(one: _core.Calibration, other: _core.Calibration) -> bool:
 @pytest.mark.parametrize("method", ["enhanced", "adjustment"])
 def test_evaluation_needs_what_is_known_and_no_more(method: Any) -> None:
     scenario, blind = parse_scenario(RANDOM), parse_scenario(BLIND).known
-    run = sd.simulate_scenario(scenario)
-    whole = sd.evaluate_scenario(scenario, run, method=method)
+    run = sd.simulate(scenario)
+    whole = sd.methods.evaluate_scenario(scenario, run, method=method)
     for known in (scenario.known, blind):
-        assert same_bits(sd.evaluate_scenario(known, run, method=method), whole)
+        assert same_bits(sd.methods.evaluate_scenario(known, run, method=method), whole)
     (one, found), (other, again) = observe(scenario), observe(blind)
     assert all(one.channels[name].tobytes() == other.channels[name].tobytes() for name in one.channels)
     assert same_bits(found.calibration, again.calibration)
@@ -139,7 +139,7 @@ def test_file_that_says_nothing_of_the_truth_is_of_a_perfect_machine() -> None:
     assert (scenario.truth.noise.distance, scenario.truth.noise.common, scenario.truth.error_map) == (0.0, 0.0, None)
     assert scenario.truth.environment is scenario.truth.assumed_environment is None
     assert scenario.truth.pose_errors == {"head": {}}
-    angles = sd.simulate_scenario(scenario).channels["alpha"]
+    angles = sd.simulate(scenario).channels["alpha"]
     assert np.max(np.abs(angles)) < 1e-15  # a perfect machine's mirror stands still, to rounding
 
 

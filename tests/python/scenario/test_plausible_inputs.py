@@ -21,7 +21,7 @@ SCALES = "\n[temperature]\nexpansion_um_per_m_k = 11.5\nu_expansion_um_per_m_k =
 
 def run_with(channels: dict[str, float | np.ndarray], text: str = PLAIN) -> tuple[sd.Scenario, sd.Measurement]:
     scenario = parse_scenario(text)
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     columns = {name: np.broadcast_to(values, len(run)).astype(float) for name, values in channels.items()}
     return scenario, sd.Measurement(run.line, run.point, run.position, {**run.channels, **columns}, run=run.run)
 
@@ -47,9 +47,9 @@ def test_a_column_that_no_workshop_has_is_refused_with_what_it_looks_like(
 ) -> None:
     scenario, run = run_with(channels)
     with pytest.raises(sd.InvalidArgument, match=words):
-        sd.adjust_scenario(scenario, run)
+        sd.methods.adjust_scenario(scenario, run)
     with pytest.raises(sd.InvalidArgument, match=words):
-        sd.evaluate_scenario(scenario, run, method="enhanced")
+        sd.methods.evaluate_scenario(scenario, run, method="enhanced")
 
 
 @pytest.mark.parametrize(
@@ -68,12 +68,12 @@ def test_a_column_beyond_the_inner_limits_is_told_and_the_fit_is_at_best_doubtfu
     channels: dict[str, float], words: str
 ) -> None:
     scenario, run = run_with(channels)
-    assert sd.adjust_scenario(*run_with({})).verdict.fit == "accepted"
-    adjustment = sd.adjust_scenario(scenario, run)
+    assert sd.methods.adjust_scenario(*run_with({})).verdict.fit == "accepted"
+    adjustment = sd.methods.adjust_scenario(scenario, run)
     assert adjustment.verdict.fit == adjustment.calibration.fit == "doubtful"
     assert [reason.finding for reason in adjustment.verdict.reasons] == ["implausible_input"]
     assert re.search(words, adjustment.calibration.fit_reasons[0])
-    linear = sd.evaluate_scenario(scenario, run, method="enhanced")
+    linear = sd.methods.evaluate_scenario(scenario, run, method="enhanced")
     assert linear.fit in ("doubtful", "rejected")
     assert re.search(words, linear.fit_reasons[-1])
 
@@ -83,7 +83,7 @@ def test_one_reading_of_a_broken_sensor_is_refused_by_its_place() -> None:
     values[7] = 85.0
     scenario, run = run_with({"temperature": values})
     with pytest.raises(sd.InvalidArgument, match=rf"{run.line[7]} point {run.point[7]}: .* got 85 °C; a sensor that"):
-        sd.adjust_scenario(scenario, run)
+        sd.methods.adjust_scenario(scenario, run)
 
 
 def test_a_jump_of_temperature_between_neighbouring_readings_is_told() -> None:
@@ -185,7 +185,7 @@ def test_stated_limits_take_the_place_of_the_default_ones() -> None:
     assert implausible_inputs(*run_with({"temperature": -15.0}, cold)) == []
     narrow = PLAIN + "\n[plausible.inputs]\nscale_temperature_c = {outer = [18, 22], inner = [19, 21]}\n"
     with pytest.raises(sd.InvalidArgument, match=r"expected 18 to 22 °C, got 22\.5 °C"):
-        sd.adjust_scenario(*run_with({"temperature": 22.5}, narrow))
+        sd.methods.adjust_scenario(*run_with({"temperature": 22.5}, narrow))
     dry = PLAIN + "\n[plausible.inputs]\nair_humidity_percent = {inner = [0, 100]}\n"
     assert implausible_inputs(*run_with({"air_humidity": 0.0062}, dry)) == []
 
@@ -211,7 +211,7 @@ def test_commands_warn_or_end_with_2(
     monkeypatch.chdir(tmp_path)
     _, run = run_with({"temperature": 45.0})
     Path("s.toml").write_text(PLAIN)
-    sd.write_measurement(run, "run.csv")
+    run.write("run.csv")
     assert main(["evaluate", "s.toml", "run.csv", "-o", "c.csv"]) == 0
     said = capsys.readouterr()
     assert "warning: run.csv: column temperature_c" in said.err

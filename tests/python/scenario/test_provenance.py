@@ -27,15 +27,15 @@ def scenario(text: str = SCENARIO, name: str = "scenario.toml") -> sd.Scenario:
 def test_fingerprints_are_those_of_the_bytes_under_any_name(here: Path) -> None:
     Path("abc").write_bytes(b"abc")
     Path("elsewhere.csv").write_bytes(b"abc")
-    found = sd.provenance_of(scenario(), "abc")
+    found = sd.methods.provenance_of(scenario(), "abc")
     assert found == {
         "program": f"stepdiag {sd.__version__}",
         "run_sha256": SHA_OF_ABC,
         "scenario_sha256": sha256("scenario.toml"),
         "options": "default",
     }
-    assert sd.provenance_of(scenario(name="other.toml").known, "elsewhere.csv") == found
-    assert sd.provenance_of(scenario(SCENARIO + "\n"), "abc")["scenario_sha256"] != found["scenario_sha256"]
+    assert sd.methods.provenance_of(scenario(name="other.toml").known, "elsewhere.csv") == found
+    assert sd.methods.provenance_of(scenario(SCENARIO + "\n"), "abc")["scenario_sha256"] != found["scenario_sha256"]
 
 
 def test_heads_count_and_the_error_map_does_not(here: Path) -> None:
@@ -45,13 +45,13 @@ def test_heads_count_and_the_error_map_does_not(here: Path) -> None:
     lines = "".join(f'[line.{line}]\nhead = "left"\n' for line in ("ppp", "npp", "p00"))
     others = "".join(f'[line.{line}]\nhead = "right"\n' for line in ("pnp", "nnp", "0p0", "00p"))
     described = SCENARIO.replace('[head]\nlayout = "ideal"\n', heads + lines + others)
-    found = sd.provenance_of(scenario(described), "run.csv")
+    found = sd.methods.provenance_of(scenario(described), "run.csv")
     assert found["heads_sha256"] == f"{sha256('mine.toml')} {sha256(shipped)}"
 
     maps = []
     for error in "0", "1":
         Path("map.csv").write_text(f"parameter,position_mm,value,unit,standard_uncertainty\nEXX,80,{error},um,\n")
-        maps.append(sd.provenance_of(scenario(of_map("map.csv")), "run.csv"))
+        maps.append(sd.methods.provenance_of(scenario(of_map("map.csv")), "run.csv"))
     assert maps[0] == maps[1]
 
 
@@ -65,7 +65,7 @@ def test_options_are_what_differs_from_the_defaults_in_one_order(here: Path) -> 
     }
     for order in list(keys), list(reversed(keys)):
         text = SCENARIO + "".join(f"[{name}]\n{keys[name]}" for name in order)
-        options = {m: sd.provenance_of(scenario(text), "run.csv", method=m)["options"] for m in METHODS}
+        options = {m: sd.methods.provenance_of(scenario(text), "run.csv", method=m)["options"] for m in METHODS}
         assert options["adjustment"] == (
             'adjustment.laser_urad=100.0; adjustment.angles="fixed"; adjustment.outlier_probability=0.001; '
             'adjustment.npp.roll_urad=5.0; adjustment.ppp.reflector_urad="fixed"; '
@@ -82,7 +82,9 @@ def test_provenance_comes_back_from_files_with_the_same_bytes(here: Path, ending
     contents = set()
     for name in f"one.{ending}", f"two.{ending}":
         assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 0
-        assert sd.read_calibration(name).provenance == sd.provenance_of(sd.read_scenario("scenario.toml"), "run.csv")
+        assert sd.read_calibration(name).provenance == sd.methods.provenance_of(
+            sd.read_scenario("scenario.toml"), "run.csv"
+        )
         contents.add(Path(name).read_bytes())
     assert len(contents) == 1
 

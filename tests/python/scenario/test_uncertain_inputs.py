@@ -185,10 +185,10 @@ def test_correlated_inputs_are_found_by_their_names() -> None:
 
 def test_evaluation_sees_nothing_of_it_but_the_weights() -> None:
     scenario = parse_scenario(TIMED)
-    run = sd.simulate_scenario(scenario)
+    run = sd.simulate(scenario)
     other = parse_scenario(TIMED + "[uncertainty]\nreflector_urad = 300.0\nrepeatability_um = 5.0\n")
-    assert sd.simulate_scenario(other).channels["distance"].tobytes() == run.channels["distance"].tobytes()
-    one, two = (sd.evaluate_scenario(s, run).functions["EXX"] for s in (scenario, other))
+    assert sd.simulate(other).channels["distance"].tobytes() == run.channels["distance"].tobytes()
+    one, two = (sd.methods.evaluate_scenario(s, run).functions["EXX"] for s in (scenario, other))
     assert [a.tobytes() for a in one] == [a.tobytes() for a in two]
 
 

@@ -39,7 +39,7 @@ def test_propagated_noise_is_what_the_evaluation_itself_states(layout: str) -> N
     """Independent noise on every channel: the evaluation's own covariance (eq. 6)."""
     calibrations = million.virtual("enhanced", layout, 6)
     propagation = million._core.propagate(calibrations, covariance=True)
-    calibration = sd.evaluate(
+    calibration = sd.methods.evaluate(
         calibrations.nominal,
         sd.Plan(VOLUME, DIAGONALS, 6, scale_lines=SCALE_LINES),
         million.HEADS[layout],

@@ -70,7 +70,7 @@ def test_a_sample_of_a_traced_head_holds_against_forty_digits(shipped: Shipped) 
     nominal = {line: {"reflector": (1e-4, -2e-4), "laser": (3e-5, 1e-4)} for line in scenario.lines}
     scenario = replace(scenario, misalignment=nominal)
     table = random_table(rng, volume, 2)
-    design = sd.read_head_design(SHIPPED_HEADS / f"{shipped.file}.toml")
+    design = sd.optics.read_head_design(SHIPPED_HEADS / f"{shipped.file}.toml")
     head = sd.Head.from_design(design, standoff=STANDOFF)
     beams = [*shipped.interferometers, *([shipped.laser, "psd", "splitter"] if shipped.laser else [])]
     inputs = _core.UncertainInputs(inputs_of(shipped, scenario.lines, [*beams, "window"]))
@@ -133,7 +133,7 @@ def assert_evaluates_to(
         {"line": line, "point": int(point), "position": position, **dict(zip(shipped.signals, row, strict=True))}
         for line, point, position, row in zip(run.line, run.point, run.position, readings, strict=True)
     ]
-    calibration = sd.evaluate(
+    calibration = sd.methods.evaluate(
         measured(rows), plan_of(scenario), head, sd.Chain(scenario.chain), scenario.tool, method="enhanced"
     )
     for output, value in zip(calibrations.outputs, values, strict=True):

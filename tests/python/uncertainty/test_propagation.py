@@ -160,7 +160,7 @@ def test_sensitivities_are_differences_of_simulated_and_evaluated_runs(layout: s
 @pytest.mark.parametrize("layout", HEADS)
 def test_noise_of_channels_is_the_covariance_of_the_evaluation(layout: str) -> None:
     setup = setup_of(layout)
-    uncertainty = sd.ReadingUncertainty(distance=DISTANCE, tilt=TILT, spot=SPOT)
+    uncertainty = sd.methods.ReadingUncertainty(distance=DISTANCE, tilt=TILT, spot=SPOT)
     model = virtual(setup, core.UncertainInputs([], channel_noise(setup)), uncertainty=uncertainty)
     found = core.propagate(model, covariance=True)
     calibration = setup.evaluate(model.nominal, uncertainty=uncertainty, full_covariance=True)
@@ -223,7 +223,7 @@ def test_noise_is_that_of_drawn_samples(quantity: str, spread: float) -> None:
 
 def test_noise_of_sensors_is_that_of_drawn_samples() -> None:
     text = find_head("beam_and_psd").read_text(encoding="utf-8").replace("# noise_um", "noise_um")
-    head = sd.Head.from_design(sd.parse_head_design(text), standoff=100.0)
+    head = sd.Head.from_design(sd.optics.parse_head_design(text), standoff=100.0)
     setup = replace(setup_of("psd", 3), head=head)
     model = virtual(setup, core.UncertainInputs([]), seed=5)
     found = core.propagate(model)
@@ -283,7 +283,7 @@ def test_contributions_are_added_to_a_measured_calibration() -> None:
     derived = core.derived_at_point(pattern, point)
     model = virtual(setup, core.UncertainInputs(inputs, channel_noise(setup)), derived=derived)
     noise = sd.Noise(distance=DISTANCE, spot=SPOT, seed=4)
-    uncertainty = sd.ReadingUncertainty(distance=DISTANCE, spot=SPOT)
+    uncertainty = sd.methods.ReadingUncertainty(distance=DISTANCE, spot=SPOT)
     measured = setup.evaluate(
         sd.simulate(machine_of(setup), setup.plan, setup.head, noise=noise),
         uncertainty=uncertainty,

@@ -16,12 +16,12 @@ import stepdiag as sd
 from stepdiag import _core
 
 AIR = Air()
-WEIGHTS = sd.ReadingUncertainty()
+WEIGHTS = sd.methods.ReadingUncertainty()
 
 
 # Large effects of the reading model miss the rest by many standard uncertainties: what a drift shares with scales would
 # then depend on where the derivatives are taken.
-KNOWN_DRIFT: Final = {"setup": sd.SetupPriors(drift="fixed")}
+KNOWN_DRIFT: Final = {"setup": sd.methods.SetupPriors(drift="fixed")}
 
 
 class Differences:
@@ -40,11 +40,11 @@ class Differences:
         s = self.scenario
         told = (measured(rows), plan_of(s), head_of(s), sd.Chain(s.chain), s.tool)
         if self.method == "adjustment":
-            calibration = sd.adjust(
+            calibration = sd.methods.adjust(
                 *told, outlier_probability=0.0, variance_components=False, full_covariance=True, **KNOWN_DRIFT
             ).calibration
         else:
-            calibration = sd.evaluate(*told, method=self.method, full_covariance=True)
+            calibration = sd.methods.evaluate(*told, method=self.method, full_covariance=True)
         functions, squareness = calibration.functions, calibration.squareness
         self.labels = [(name, np.nan if at is None else at) for name, at in calibration.covariance_labels]
         self.covariance = calibration.covariance

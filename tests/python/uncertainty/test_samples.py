@@ -137,9 +137,9 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
     if method == "adjustment":
         # By the tilts of a scale line its laser has more or less effect; a batch takes those of the nominal run.
         # These readings miss the model by five times what is stated: what a drift shares with scales would move.
-        known_lasers = {line: sd.SetupPriors(laser="fixed") for line in scenario.scale_lines}
+        known_lasers = {line: sd.methods.SetupPriors(laser="fixed") for line in scenario.scale_lines}
         options = {"outlier_probability": 0.0, "variance_components": False, "setup_by_line": known_lasers}
-        options["setup"] = sd.SetupPriors(drift="fixed")
+        options["setup"] = sd.methods.SetupPriors(drift="fixed")
     calibrations = calibrations_of(scenario, table, inputs, method=method, **options)
     block = np.asarray(calibrations.evaluate(0, 32))
     names = [(one.name, one.position) for one in calibrations.outputs]
@@ -148,9 +148,9 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
         rows = Sample(scenario, table, inputs, drawn(inputs, SEED, [sample])[:, 0], noise_of=(SEED, sample)).rows()
         told = (measured(rows), plan_of(scenario), head_of(scenario), sd.Chain(scenario.chain), scenario.tool)
         if method == "adjustment":
-            calibration = sd.adjust(*told, **options).calibration
+            calibration = sd.methods.adjust(*told, **options).calibration
         else:
-            calibration = sd.evaluate(*told, method=method)
+            calibration = sd.methods.evaluate(*told, method=method)
         for (name, position), value in zip(names, block[:, sample], strict=True):
             if name in calibration.squareness:
                 expected, u = calibration.squareness[name]

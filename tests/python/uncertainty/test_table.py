@@ -16,7 +16,7 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.io.netcdf import open_dataset
-from stepdiag.report.uncertainty import opening_rows, result_rows
+from stepdiag.presentation.uncertainty import opening_rows, result_rows
 from stepdiag.scenario.description import parse_scenario
 from stepdiag.uncertainty.result import UncertaintyResult, find_output, label, only_survivors
 from stepdiag.uncertainty.table import uncertainty_table

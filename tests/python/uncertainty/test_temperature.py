@@ -25,19 +25,19 @@ axes_c = 23.0
 LARGE = SCENARIO.replace("x_mm = 80.0", "x_mm = 800.0").replace("y_mm = 60.0", "y_mm = 600.0")
 
 
-def calibrations(u: float, sensor: float) -> sd.VirtualCalibrations:
+def calibrations(u: float, sensor: float) -> sd.montecarlo.VirtualCalibrations:
     scenario = parse_scenario(LARGE + STEEL.format(u=u, sensor=sensor))
     return virtual_calibrations(scenario, seed=1)
 
 
-def end_of_x(values: np.ndarray, of: sd.VirtualCalibrations) -> float:
+def end_of_x(values: np.ndarray, of: sd.montecarlo.VirtualCalibrations) -> float:
     places = [(output.name, output.position) for output in of.outputs]
     return float(values[places.index(("EXX", 800.0))])
 
 
 def propagated(u: float, sensor: float) -> float:
     of = calibrations(u, sensor)
-    return end_of_x(sd.propagate(of).standard_uncertainty, of)
+    return end_of_x(sd.montecarlo.propagate(of).standard_uncertainty, of)
 
 
 def test_propagation_has_the_uncertainties_of_the_formula() -> None:
@@ -49,13 +49,13 @@ def test_propagation_has_the_uncertainties_of_the_formula() -> None:
 
 
 def test_budget_names_both() -> None:
-    budget = sd.propagate(calibrations(1.0, 0.1)).budget
+    budget = sd.montecarlo.propagate(calibrations(1.0, 0.1)).budget
     assert {"expansion of the scales", "temperature of the scales"} <= set(budget)
 
 
 def test_virtual_calibrations_scatter_as_propagated() -> None:
     of, count = calibrations(1.0, 0.1), 20_000
-    result = sd.run_monte_carlo(of, samples=count)
+    result = sd.montecarlo.run_monte_carlo(of, samples=count)
     u = end_of_x(result.standard_uncertainty, of)
     assert u == pytest.approx(propagated(1.0, 0.1), rel=4.0 / np.sqrt(2.0 * count))  # four standard deviations
 
@@ -63,7 +63,7 @@ def test_virtual_calibrations_scatter_as_propagated() -> None:
 def test_an_adjustment_states_what_its_virtual_calibrations_scatter_by() -> None:
     def stated(u: float, sensor: float) -> float:
         scenario = parse_scenario(LARGE + STEEL.format(u=u, sensor=sensor))
-        found = sd.adjust_scenario(scenario, sd.simulate_scenario(scenario)).calibration
+        found = sd.methods.adjust_scenario(scenario, sd.simulate(scenario)).calibration
         return float(found.functions["EXX"][2][-1] ** 2)
 
     # Priors of the set-ups, which are no uncertain inputs here, are in what is stated.
@@ -79,7 +79,7 @@ def test_many_sets_are_adjusted_as_each_by_itself() -> None:
     )
     scenario = replace(random_scenario(rng, steps=6, seconds_per_reading=5.0), scales=scales)
     run = measured(reference.simulate(scenario, random_table(rng, scenario.volume, 6)))
-    expansion = sd.KnownExpansion(
+    expansion = sd.methods.KnownExpansion(
         sd.Expansion((8e-6, 11e-6, 1.1e-5), fixed_point=scales.fixed_point),
         (1e-6, 1e-6, 0.0),
         one_coefficient=False,
@@ -89,13 +89,13 @@ def test_many_sets_are_adjusted_as_each_by_itself() -> None:
     signals = ("distance", "alpha", "beta")
     readings = np.stack([run.channels[name] for name in signals], axis=1)
     noise = rng.normal(size=(5, *readings.shape)) * np.array([1e-4, 1e-6, 1e-6])
-    evaluator = sd.BatchEvaluator(run, *told, method="adjustment", expansion=expansion)
+    evaluator = sd.montecarlo.BatchEvaluator(run, *told, method="adjustment", expansion=expansion)
     together = evaluator.evaluate(readings + noise)
     for one, values in zip(readings + noise, together, strict=True):
         own = sd.Measurement(
             run.line, run.point, run.position, {**run.channels, **dict(zip(signals, one.T, strict=True))}
         )
-        alone = sd.adjust(own, *told, expansion=expansion, outlier_probability=0.0).calibration
+        alone = sd.methods.adjust(own, *told, expansion=expansion, outlier_probability=0.0).calibration
         expected = [
             alone.squareness[entry.parameter][0]
             if np.isnan(entry.position)
@@ -109,7 +109,7 @@ def test_many_sets_are_adjusted_as_each_by_itself() -> None:
 def test_published_evaluations_correct_their_lengths_first(method: str) -> None:
     scenario = parse_scenario(LARGE.replace("[machine.random]\nseed = 7\n", "") + STEEL.format(u=0.0, sensor=0.0))
     scenario = replace(scenario, truth=replace(scenario.truth, misalignment={}, noise=sd.Noise()))
-    found = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario), method=method)
+    found = sd.methods.evaluate_scenario(scenario, sd.simulate(scenario), method=method)
     assert found.temperature_reference == 20.0
     assert found.expansion == pytest.approx([11.5e-6] * 3, rel=1e-15)
     largest = max(float(np.max(np.abs(value))) for _, value, _ in found.functions.values())
@@ -138,7 +138,7 @@ def test_a_ramp_of_the_temperature_is_that_of_a_run_that_warms_up_unseen() -> No
         )
         said = {**run.channels, "temperature": np.full(len(run), 23.0)}
         unseen = sd.Measurement(run.line, run.point, run.position, said)
-        return float(sd.evaluate_scenario(scenario, unseen, method="enhanced").functions["EXX"][1][-1])
+        return float(sd.methods.evaluate_scenario(scenario, unseen, method="enhanced").functions["EXX"][1][-1])
 
     of = virtual_calibrations(scenario, method="enhanced", seed=1)
     nominal, ramped = (end_of_x(values, of) for values in of.evaluate_at(np.array([[0.0, rate]])).T)

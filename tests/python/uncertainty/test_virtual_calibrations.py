@@ -167,7 +167,7 @@ def test_samples_are_runs_evaluated(head: str) -> None:
         nominal.position,
         {name: readings[:, k] for k, name in enumerate(names)},
     )
-    calibration = sd.evaluate(run, plan(), heads()[head], machine().chain, TOOL, method="enhanced")
+    calibration = sd.methods.evaluate(run, plan(), heads()[head], machine().chain, TOOL, method="enhanced")
     for output, value in zip(model.outputs, outputs[:, 1], strict=True):
         if np.isnan(output.position):
             expected, u = calibration.squareness[output.name]

@@ -1,0 +1,151 @@
+"""Export of a calibration in the format of a controller: `export`.
+
+All errors here are actual minus commanded, of the tool relative to the workpiece; the compensation
+has the opposite sign. Every format states, in its file or beside it, which of the two it contains,
+and for which chain, tool and reference point.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from stepdiag._core import Calibration, InvalidArgument, read_error_map
+from stepdiag.calibration.finding_text import MEANING, check_angles
+from stepdiag.exporting.common import ExportOptions, tool_of
+from stepdiag.exporting.csv_grid import csv_grid
+from stepdiag.exporting.isg import isg
+from stepdiag.exporting.linuxcnc_comp import linuxcnc_comp
+from stepdiag.exporting.linuxcnc_kins import linuxcnc_kins
+from stepdiag.exporting.polynomial import calibxyzkins, matrix, squareness
+from stepdiag.exporting.position_error import position_error
+from stepdiag.exporting.result import Export
+from stepdiag.io.data_files import is_netcdf, read_calibration
+from stepdiag.io.whole_files import check_output, make_folder, write_set
+from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
+
+# Format -> its options besides `tool`, `origin`, `incomplete` and `accept_rejected`.
+FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
+    "linuxcnc-comp": ("at", "rows"),
+    "linuxcnc-kins": ("approach",),
+    "isg": ("approach", "rows", "squareness"),
+    "csv-grid": ("approach", "nodes", "step", "orientation"),
+    "squareness": (),
+    "matrix": ("approach",),
+    "calibxyzkins": ("approach",),
+    "position-error": ("approach", "axis", "depends_on", "at", "rows"),
+}
+
+
+def read_what_is_exported(path: Path) -> Calibration:
+    """Read a calibration, CSV or netCDF, or an error map with chain, volume and tool.
+
+    Parameters that an error map lacks are 0. Raises InvalidArgument naming the file, and the line
+    or variable."""
+    calibration = read_calibration(path)
+    check_angles(calibration.to_error_map(), str(path))
+    if is_netcdf(path) or not read_error_map(path).header.get("format", "").startswith("stepdiag error map"):
+        return calibration
+    edges = dict(zip(AXES, calibration.volume, strict=True))
+    nothing = {name: (np.array([0.0, edges[name[2]]]), np.zeros(2), np.full(2, np.nan)) for name in FUNCTIONS}
+    return Calibration(
+        calibration.method,
+        calibration.chain,
+        calibration.volume,
+        calibration.tool,
+        nothing | calibration.functions,
+        dict.fromkeys(SQUARENESSES, (0.0, np.nan)) | calibration.squareness,
+        reversal=calibration.reversal,
+        reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},
+        date=calibration.date,
+        fit=calibration.fit,
+        variance_factor=calibration.variance_factor,
+        fit_reasons=calibration.fit_reasons,
+        unseen_faults=calibration.unseen_faults,
+        conditions=calibration.conditions,
+        budget=calibration.budget,
+        uncertainty_scaled=calibration.uncertainty_scaled,
+        between_nodes=calibration.between_nodes,
+        temperature_reference=calibration.temperature_reference,
+        temperature_as_found=calibration.temperature_as_found,
+        expansion=calibration.expansion,
+        fixed_point=calibration.fixed_point,
+        unverified=calibration.unverified,
+    )
+
+
+def check_fit(calibration: Calibration, name: str, accept_rejected: bool) -> None:
+    """Raise InvalidArgument for a rejected fit unless that is accepted.
+
+    `name` is used in messages."""
+    if calibration.fit == "rejected" and not accept_rejected:
+        raise InvalidArgument(
+            f"{name}: fit=rejected: {MEANING['rejected']}; measure again, or export it all the same with "
+            "`accept_rejected`"
+        )
+
+
+def export(
+    calibration: Calibration, output: str | PathLike[str], *, to: str, options: ExportOptions | None = None, **more: Any
+) -> list[str]:
+    """Write a calibration for a controller. Returns notes: settings, losses, what is not corrected.
+
+    Files are written completely or not at all; notes that begin with "warning:" say what makes the machine worse.
+
+    Args:
+        calibration: the calibration to export.
+        output: the file to write; for linuxcnc-comp a folder, which is created.
+        to: format, one of FORMATS (docs/exports.md): "linuxcnc-kins", "linuxcnc-comp", "isg", "csv-grid",
+            "squareness", "matrix", "calibxyzkins" or "position-error".
+        options: ExportOptions, or its fields by name.
+
+    Raises:
+        InvalidArgument: an option does not belong to the format, the calibration does not determine
+            a required value (unless `incomplete`), its fit was rejected (unless `accept_rejected`),
+            or the format cannot represent it.
+    """
+    if options is not None and more:
+        raise TypeError("export(): expected `options`, or its fields by name, got both")
+    return write_export(calibration, to, Path(output), options or ExportOptions(**more)).told
+
+
+def write_export(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
+    """Write as `export` does, and return also what is compensated and what is left."""
+    export = _prepare(calibration, to, output, options)
+    if to == "linuxcnc-comp":
+        make_folder(output)
+    for path in export.files:
+        check_output(path)
+    write_set(export.files)
+    return export
+
+
+def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
+    formats = {
+        "linuxcnc-comp": linuxcnc_comp,
+        "linuxcnc-kins": linuxcnc_kins,
+        "isg": isg,
+        "csv-grid": csv_grid,
+        "squareness": squareness,
+        "matrix": matrix,
+        "calibxyzkins": calibxyzkins,
+        "position-error": position_error,
+    }
+    if to not in formats:
+        raise InvalidArgument(f"`to`: expected one of {', '.join(formats)}, got {to!r}")
+    taken = {"tool", "origin", "incomplete", "accept_rejected", *FORMATS[to]}
+    for field in fields(options):
+        if field.name not in taken and getattr(options, field.name) is not None:
+            theirs = " or ".join(name for name, names in FORMATS.items() if field.name in names)
+            raise InvalidArgument(f"`{field.name}`: belongs to {theirs}, not to {to}")
+    for name in ("tool", "origin", "at"):
+        numbers = getattr(options, name)
+        if numbers is not None and (len(numbers) != 3 or not np.all(np.isfinite(numbers))):
+            raise InvalidArgument(f"`{name}`: expected three lengths in mm, got {numbers}")
+    check_fit(calibration, "calibration", options.accept_rejected)
+    if calibration.method == "conventional" and not np.array_equal(tool_of(calibration, options), calibration.tool):
+        raise InvalidArgument("`tool`: tables of the method conventional hold for the tool of the measurement only")
+    return formats[to](calibration, output, options)
