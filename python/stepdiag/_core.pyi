@@ -7,10 +7,11 @@ import matplotlib.figure
 import numpy
 import numpy.typing
 import os
+import pandas
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_measurement', 'read_signals', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -379,11 +380,22 @@ class Measurement:
         """
         Draw the readings, or with the adjustment of this measurement its residuals (a matplotlib Figure).
         """
+    def to_dataframe(self) -> pandas.DataFrame:
+        """
+        The measurement as a pandas.DataFrame: a row for each point, with its line, number, run, direction, commanded
+            position x, y, z (mm), channels (mm, rad) and their standard uncertainties as NAME_u.
+        """
     def to_xarray(self) -> xarray.Dataset:
         """
         The measurement as a labelled table (xarray.Dataset).
         """
     def write(self, path: str | os.PathLike[str]) -> None:
+        """
+        Write the measurement, CSV or netCDF (a name that ends in .nc). Reading it returns the same bits.
+        
+            Raises InvalidArgument where it cannot be written.
+        """
+    def write_csv(self, path: str | os.PathLike[str]) -> None:
         """
         Writes the measurement CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot be written.
         """
@@ -1291,6 +1303,11 @@ class Calibration:
         """
         Draw the 21 parameters with 95 % bands (a matplotlib Figure). truth: errors to draw beside them.
         """
+    def to_dataframe(self) -> pandas.DataFrame:
+        """
+        The calibration as a pandas.DataFrame: a row for each value, with the columns parameter, position (mm; NaN of a
+            squareness), value, standard_uncertainty (mm or rad) and unit.
+        """
     def to_error_map(self) -> ErrorMap:
         """
         The calibration as a machine's errors; what is undetermined is 0 there.
@@ -1311,9 +1328,121 @@ class Calibration:
         """
         The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other keys, and for texts that are empty or of more than one line.
         """
-    def write(self, path: str | os.PathLike[str]) -> None:
+    def write(self, path: str | os.PathLike[str], *, provenance: collections.abc.Mapping[str, str] | None = None, between_nodes: float | None = None) -> Calibration:
+        """
+        Write the calibration, CSV or netCDF (a name that ends in .nc), and return it as written, with a date.
+        
+            Reading it returns the same bits; CSV has no covariance. `provenance` and `between_nodes` (mm) replace those of the
+            calibration. Raises InvalidArgument where it cannot be written, or the provenance has other keys.
+        """
+    def write_csv(self, path: str | os.PathLike[str]) -> None:
         """
         Writes the calibration CSV (the covariance is not kept). Raises InvalidArgument when it cannot be written.
+        """
+    @property
+    def A0Z(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        A0Z: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def B0Z(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        B0Z: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def C0Y(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        C0Y: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EAX(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EAX: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EAY(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EAY: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EAZ(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EAZ: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EBX(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EBX: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EBY(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EBY: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EBZ(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EBZ: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def ECX(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        ECX: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def ECY(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        ECY: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def ECZ(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        ECZ: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EXX(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EXX: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EXY(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EXY: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EXZ(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EXZ: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EYX(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EYX: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EYY(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EYY: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EYZ(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EYZ: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EZX(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EZX: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EZY(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EZY: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
+        """
+    @property
+    def EZZ(self) -> stepdiag.io.displays.ParameterValues:
+        """
+        EZZ: position (mm), value and standard uncertainty (mm or rad), as of `[...]`.
         """
     @property
     def between_nodes(self) -> float | None:
@@ -2247,6 +2376,12 @@ class Adjustment:
     def with_mistake(self, mistake: str) -> Adjustment:
         """
         The same, rejected because this mistake would explain the readings.
+        """
+    def write(self, path: str | os.PathLike[str], *, measurement: Measurement | None = None, provenance: collections.abc.Mapping[str, str] | None = None, between_nodes: float | None = None) -> Calibration:
+        """
+        Write the calibration as Calibration.write does; in netCDF with set-ups, residuals and test values.
+        
+            `measurement` labels the residuals with run, line, point and direction.
         """
     @property
     def calibration(self) -> Calibration:
@@ -3817,13 +3952,13 @@ def read_error_map(path: str | os.PathLike[str]) -> ErrorMap:
     """
     Reads an error map or calibration CSV. Raises InvalidArgument naming file and line.
     """
-def read_head(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None, assumed_environment: Environment | None = None) -> dict[str, float | None]:
-    """
-    The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.
-    """
 def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     Reads a measurement CSV. Raises InvalidArgument naming file and line.
+    """
+def read_signals(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None, assumed_environment: Environment | None = None) -> dict[str, float | None]:
+    """
+    The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.
     """
 def recheck(baseline: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, priors: ChangePriors = ...) -> Recheck:
     """

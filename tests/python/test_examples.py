@@ -24,33 +24,48 @@ def test_quickstart_shows_that_each_method_is_better_than_the_one_before() -> No
     assert adjustment == "adjustment: positioning known to 0.000000 µm"
     assert mirror == "the mirror stood at 100.000, 300.000 µrad on ppp"
     assert judged == "the run of examples/scenario.toml is accepted"
+
+
+def test_program_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
-    assert "\n".join(f"    {line}" for line in lines) in readme
-    code = (EXAMPLES / "quickstart.py").read_text(encoding="utf-8")
-    assert all(line in code for line in readme.split("```python\n")[1].split("```")[0].splitlines())
+    (tmp_path / "program.py").write_text(readme.split("```python\n")[1].split("```")[0], encoding="utf-8")
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    monkeypatch.chdir(tmp_path)
+    assert output_of("program.py").startswith("accepted []\n")
+    assert sd.read_calibration("table.csv").fit == "accepted"
+    assert "<html" in Path("report.html").read_text(encoding="utf-8")[:200]
 
 
-def test_readme_has_the_report_of_the_example(tmp_path: Path) -> None:
+def test_compensation_leaves_as_much_as_readme_says() -> None:
+    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    before, after = (
+        line.split("largest error ")[1].split(" µm")[0]
+        for line in output_of(EXAMPLES / "before_and_after.py").splitlines()
+    )
+    assert f"falls from {before} to {after} µm" in readme
+
+
+def test_report_page_has_what_evaluate_prints(tmp_path: Path) -> None:
     run, out = tmp_path / "run.csv", tmp_path / "calibration.csv"
     sd.simulate(sd.read_scenario(EXAMPLES / "scenario.toml")).write(run)
     said = output_of("-m", "stepdiag", "evaluate", EXAMPLES / "scenario.toml", run, "-o", out)
-    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
-    assert all(f"    {line}\n" in readme for line in said.splitlines()[:13])
+    page = (EXAMPLES.parent / "docs" / "report.md").read_text(encoding="utf-8")
+    assert all(f"    {line}\n" in page for line in said.splitlines()[:13])
 
 
-def test_better_plan_is_as_much_better_as_readme_says(tmp_path: Path) -> None:
+def test_better_plan_is_as_much_better_as_the_page_on_plans_says(tmp_path: Path) -> None:
     paper, better = output_of(EXAMPLES / "two_plans.py", tmp_path / "plans.png").splitlines()
     assert (tmp_path / "plans.png").read_bytes().startswith(b"\x89PNG")
     paper_plan, better_plan = ((EXAMPLES / name).read_text() for name in ("scenario.toml", "better_plan.toml"))
     assert better_plan.split("[volume]")[1].replace('scale_points = "steps"\n', "") == paper_plan.split("[volume]")[1]
-    readme = " ".join((EXAMPLES.parent / "README.md").read_text(encoding="utf-8").split())
+    page = " ".join((EXAMPLES.parent / "docs" / "plans.md").read_text(encoding="utf-8").split())
     for kind, said in {
         "positioning": "positioning falls from {} to {}",
         "straightness": "straightness from {} to {}",
         "angle": "angles from {} to {}",
     }.items():
         values = [line.split(f"{kind} ")[1].split(",")[0].split()[0] for line in (paper, better)]
-        assert said.format(*values) in readme
+        assert said.format(*values) in page
 
 
 def test_method_page_has_the_tables_of_the_examples() -> None:

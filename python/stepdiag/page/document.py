@@ -84,8 +84,9 @@ def report(
             calibration.write(file)
         else:
             file = Path(calibration)
-        others = (None if path is None else Path(path) for path in (before, scenario, run, uncertainty))
-        request = ReportRequest(file, *others, limit, header, None if logo is None else Path(logo))
+        of = {"before": before, "scenario": scenario, "run": run, "uncertainty": uncertainty, "logo": logo}
+        given = {name: Path(path) for name, path in of.items() if path is not None}
+        request = ReportRequest(file, limit=limit, words=header, **given)
         return list(write_report(request, Path(output)).notes)
 
 

@@ -217,10 +217,10 @@ def table_of_report(report: str) -> dict[tuple[str, str], list[str]]:
     return cells
 
 
-def test_readme_has_the_numbers_of_the_demo(demo: Path) -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_page_on_the_paper_has_the_numbers_of_the_demo(demo: Path) -> None:
+    page = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
     table = table_of_report((demo / "report.txt").read_text(encoding="utf-8"))
-    rows = re.findall(r"^\|.*\((\d\w?)(?:, \w+)?\) \| (.+) \|$", readme, re.MULTILINE)
+    rows = re.findall(r"^\|.*\((\d\w?)(?:, \w+)?\) \| (.+) \|$", page, re.MULTILINE)
     assert [panel for panel, _ in rows] == ["1a", "1b", "1c", "1d", "3a"]
     for panel, row in rows:
         case = "3" if panel == "3a" else panel

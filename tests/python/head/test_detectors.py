@@ -274,8 +274,8 @@ BAD: list[tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]] = [
     (sd.optics.ReturnedBeam, ((0, 0), (0, 0, -1), INF, 1.0), {}, "optical_length"),
     (sd.optics.ReturnedBeam, ((0, 0), (0, 0, -1), 1.0, NAN), {}, "reduced_length"),
     (sd.optics.couple, (MODE, from_mirror(10.0, 0.0), 0.0), {}, "index"),
-    (sd.optics.read_distance, (sd.optics.Interferometer(), MODE, from_mirror(10.0, 0.0)), {"true_index": NAN}, "true_index"),
-    (sd.optics.read_distance, (sd.optics.Interferometer(), MODE, from_mirror(10.0, 0.0)), {"assumed_index": -1}, "assumed_index"),
+    *((sd.optics.read_distance, (sd.optics.Interferometer(), MODE, from_mirror(10.0, 0.0)), {name: bad}, name)
+      for name, bad in [("true_index", NAN), ("assumed_index", -1)]),
     *((sd.optics.Interferometer, (), {key: bad}, f"interferometer {key}") for key, bad in [
         ("aperture", 0.0), ("acceptance", -1.0), ("least_coupling", 2.0), ("resolution", -1e-9),
         ("periodic_amplitude", NAN), ("dead_path", INF), ("index_error", 0.5)]),

@@ -14,7 +14,6 @@ from scipy.interpolate import RegularGridInterpolator
 from usual import SMALL_VOLUME as VOLUME
 
 import stepdiag as sd
-from stepdiag.exporting.write import export
 
 TOOL = (3.0, -5.0, 40.0)
 CHAINS = ["[w X' b Y Z t]", "[w b X Y Z t]", "[w Y' X' b Z t]", "[w Z' b Y X t]", "[w X' Z' Y' b t]"]
