@@ -42,12 +42,14 @@ from stepdiag._core import (
 from stepdiag._core import word_findings_with as _word_findings_with
 from stepdiag._core import word_reasons_with as _word_reasons_with
 from stepdiag._core import word_unseen_faults_with as _word_unseen_faults_with
+from stepdiag._core import word_wrong_arguments_with as _word_wrong_arguments_with
 from stepdiag.calibration.finding_text import reason_texts as _reason_texts
 from stepdiag.calibration.finding_text import undetermined_text as _undetermined_text
 from stepdiag.calibration.unseen_text import unseen_texts as _unseen_texts
 from stepdiag.figures.methods import attach as _attach_figures
 from stepdiag.io.displays import attach as _attach_displays
 from stepdiag.io.methods import attach as _attach_files
+from stepdiag.wrong_arguments import wrong_arguments as _wrong_arguments
 
 if TYPE_CHECKING:
     from stepdiag import live, methods, montecarlo, optics, positions, results
@@ -171,6 +173,7 @@ _attach_figures()
 _word_findings_with(_undetermined_text)  # the extension's findings are worded here
 _word_reasons_with(_reason_texts)
 _word_unseen_faults_with(_unseen_texts)
+_word_wrong_arguments_with(_wrong_arguments)
 
 
 def __getattr__(name: str) -> Any:

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "bindings.hpp"
+#include "wrong_arguments.hpp"
 #include "stepdiag/version.hpp"
 
 namespace stepdiag::bindings {
@@ -179,4 +180,5 @@ PYBIND11_MODULE(_core, m) {
     bind_monte_carlo(m);
     bind_uncertainty(m);
     bind_controller(m);
+    bind_wrong_arguments(m);
 }

@@ -23,6 +23,7 @@ from stepdiag.io.data_files import write_measurement
 from stepdiag.io.whole_files import check_output
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.known import Known
+from stepdiag.wrong_arguments import checked
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ def raw_path(output: Path) -> Path:
     return output.with_suffix(".raw.jsonl")
 
 
+@checked
 def acquire(
     scenario: Scenario | Known,
     source: str,

@@ -19,6 +19,7 @@ from stepdiag.display import Displayed, Facts, lengths_text
 from stepdiag.parameters import units_of
 from stepdiag.style import drawn
 from stepdiag.units import report_value
+from stepdiag.wrong_arguments import checked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -155,6 +156,7 @@ def made_of(calibration: Calibration) -> dict[str, str]:
     return {"method": calibration.method, "date": calibration.date, "temperature": temperature}
 
 
+@checked
 def compare(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *, limit: float = 0.05) -> Comparison:
     """Differences B - A of all parameters that both determine, with their significance.
 

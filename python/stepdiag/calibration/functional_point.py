@@ -16,6 +16,7 @@ import numpy as np
 
 from stepdiag._core import Calibration, straightness_reference
 from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
+from stepdiag.wrong_arguments import checked
 
 __all__ = ["functional_point_straightness", "straightness_reference"]
 
@@ -27,6 +28,7 @@ _CROSS_PRODUCT: Final[Mapping[str, tuple[tuple[str, str, float], ...]]] = {
 }
 
 
+@checked
 def functional_point_straightness(
     calibration: Calibration,
 ) -> dict[str, tuple[FloatArray, FloatArray, FloatArray]]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from stepdiag._core import Calibration, ErrorMap
 from stepdiag.parameters import KINDS, Kind, kind_of
+from stepdiag.wrong_arguments import checked
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,7 @@ class Deviation:
     position: float | None  # mm; none for a squareness
 
 
+@checked
 def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, Deviation]:
     """Largest deviations of a calibration from the truth, at the calibration's nodes.
 
@@ -75,6 +77,7 @@ def largest_entries(calibration: Calibration, *, uncertainty: bool = False) -> d
     return {kind: largest[kind] for kind in KINDS if kind in largest}
 
 
+@checked
 def largest_uncertainties(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
     """The largest standard uncertainty of each kind, mm or rad, and the parameter and place that has it."""
     entries = largest_entries(calibration, uncertainty=True)

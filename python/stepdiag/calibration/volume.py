@@ -23,6 +23,7 @@ from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 from stepdiag.style import drawn
+from stepdiag.wrong_arguments import checked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,6 +151,7 @@ class VolumeErrors(Displayed):
         return drawn(self)
 
 
+@checked
 def volume(
     source: Calibration | Machine,
     *,
@@ -270,6 +272,7 @@ class PointErrors:
     tilt_uncertainty: FloatArray | None  # (n, 3) rad
 
 
+@checked
 def errors_at(
     source: Calibration | Machine,
     points: npt.ArrayLike,
@@ -304,6 +307,7 @@ def variances_in_volume(calibration: Calibration, count: int = 5) -> FloatArray:
     return variances
 
 
+@checked
 def volume_grid(box: npt.ArrayLike, count: int | Sequence[int]) -> FloatArray:
     """Commanded points (n, 3), mm, of a grid with `count` equidistant positions an axis; Z changes fastest.
 

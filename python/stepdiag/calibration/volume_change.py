@@ -11,6 +11,7 @@ from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.calibration.volume import Interval, VolumeErrors, volume, without_between_nodes
 from stepdiag.display import Displayed, Facts
+from stepdiag.wrong_arguments import checked
 
 ChangeVerdict = Literal["improved", "worse", "cannot be told"]
 # Positions an axis, besides the nodes: the trapezoidal rule is then good to 1 % of the rms between rough nodes.
@@ -68,6 +69,7 @@ class VolumeChange(Displayed):
         ]
 
 
+@checked
 def volume_change(comparison: Comparison) -> VolumeChange:
     """Compute the largest error and the rms over the volume by A and by B, with verdicts and the parameters' effects.
 

@@ -22,6 +22,7 @@ from stepdiag.scenario.description import (
     evaluate_beside_adjustment,
 )
 from stepdiag.scenario.known import Known
+from stepdiag.wrong_arguments import checked
 
 # A sound run has a misfit at least as improbable in one of twenty cases. A search takes as long as an evaluation.
 SEARCHED_BELOW: Final = 0.05
@@ -80,6 +81,7 @@ class Judgement:
         return self.calibration.fit_reasons
 
 
+@checked
 def evaluate(
     scenario: Scenario | Known,
     measurement: Measurement,
@@ -94,6 +96,7 @@ def evaluate(
     return judge(scenario, measurement, method=method, full_covariance=full_covariance).calibration
 
 
+@checked
 def judge(
     scenario: Scenario | Known,
     measurement: Measurement,

@@ -26,6 +26,7 @@ from stepdiag.exporting.result import Export
 from stepdiag.io.data_files import is_netcdf, read_calibration
 from stepdiag.io.whole_files import check_output, make_folder, write_set
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
+from stepdiag.wrong_arguments import checked
 
 # Format -> its options besides `tool`, `origin`, `incomplete` and `accept_rejected`.
 FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -88,6 +89,7 @@ def check_fit(calibration: Calibration, name: str, accept_rejected: bool) -> Non
         )
 
 
+@checked
 def export(
     calibration: Calibration, output: str | PathLike[str], *, to: str, options: ExportOptions | None = None, **more: Any
 ) -> list[str]:

@@ -40,6 +40,7 @@ from stepdiag.config.key_errors import show, suggest
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import read_text
 from stepdiag.units import MICROMETRE, MILLIRADIAN, NANOMETRE, PPM
+from stepdiag.wrong_arguments import checked
 
 ROOM: Final = 100.0  # mm between a head and its mirror where no scenario gives the distance
 FOLDER: Final = Path(str(resource_files("stepdiag.head") / "shipped"))
@@ -50,6 +51,7 @@ def shipped_heads() -> list[str]:
     return sorted(file.stem for file in FOLDER.glob("*.toml"))
 
 
+@checked
 def shipped_head(name: str) -> _core.HeadDesign:
     """Return a head that comes with the package: "three_beams" or "beam_and_psd".
 
@@ -74,6 +76,7 @@ def find_shipped_head(name: str) -> Path:
     return FOLDER / f"{name}.toml"
 
 
+@checked
 def read_head_design(path: str | PathLike[str]) -> _core.HeadDesign:
     """Read and check a head description (TOML).
 
@@ -81,6 +84,7 @@ def read_head_design(path: str | PathLike[str]) -> _core.HeadDesign:
     return parse_head_design(read_text(Path(path)), path)
 
 
+@checked
 def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _core.HeadDesign:
     """Parse and check the text of a head description; `path` names it in messages.
 

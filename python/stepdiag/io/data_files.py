@@ -9,6 +9,7 @@ from pathlib import Path
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.io.whole_files import write_by_core
+from stepdiag.wrong_arguments import checked
 
 # Imports inside functions keep programs fast that use CSV only.
 
@@ -18,6 +19,7 @@ def is_netcdf(path: str | PathLike[str]) -> bool:
     return os.fspath(path).lower().endswith(".nc")
 
 
+@checked
 def read_measurement(path: str | PathLike[str]) -> Measurement:
     """Read a measurement, CSV or netCDF (.nc).
 
@@ -32,6 +34,7 @@ def read_measurement(path: str | PathLike[str]) -> Measurement:
         return read_measurement_netcdf(Path(path))
 
 
+@checked
 def read_calibration(path: str | PathLike[str]) -> Calibration:
     """Read a calibration, CSV or netCDF (.nc).
 

@@ -26,6 +26,7 @@ from stepdiag.mistakes.nominal_way import Way, distance_of, ways_of
 from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
+from stepdiag.wrong_arguments import checked
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
@@ -99,6 +100,7 @@ class _Tried:
         return self.fit.excess(factor) + self.hypothesis.free
 
 
+@checked
 def find_mistakes(
     scenario: Scenario | Known,
     measurement: _core.Measurement,

@@ -44,8 +44,10 @@ from stepdiag.page.words import (
     verdict_block,
 )
 from stepdiag.style import COLOUR
+from stepdiag.wrong_arguments import checked
 
 
+@checked
 def report(
     calibration: Calibration | Adjustment | str | PathLike[str],
     output: str | PathLike[str],

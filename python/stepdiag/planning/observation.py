@@ -20,6 +20,7 @@ from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_sc
 from stepdiag.scenario.known import Known, known_of
 from stepdiag.scenario.truth import Truth
 from stepdiag.scenario.uncertain_inputs import OF_SCALE_LINES
+from stepdiag.wrong_arguments import checked
 
 USUAL_STEPS: Final = (5, 10, 20, 50, 100, 200)
 
@@ -35,6 +36,7 @@ class Prospect:
     trouble: str = ""
 
 
+@checked
 def observe(scenario: Scenario | Known) -> tuple[_core.Measurement, Adjustment]:
     """The error-free run of a scenario, and what is found in it, with the faults that its readings control. Raises
     InvalidArgument where nothing is."""
@@ -73,6 +75,7 @@ def _prospect(known: Known, steps: int) -> Prospect:
     )
 
 
+@checked
 def extents(calibration: Calibration, plan: _core.Plan) -> tuple[list[str], list[str], list[str]]:
     """The parameters of a calibration that are determined as a whole, but for a slope, and at some nodes only."""
     functions = calibration.functions

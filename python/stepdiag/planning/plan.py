@@ -7,8 +7,10 @@ from stepdiag.planning.best_plan import best_plans
 from stepdiag.planning.plan_by_time import Aim, Choice, Family, choose, own_spacing, squareness_goal, volume_goal
 from stepdiag.scenario.description import Scenario
 from stepdiag.units import MICROMETRE, MICRORADIAN
+from stepdiag.wrong_arguments import checked
 
 
+@checked
 def plan(
     scenario: Scenario,
     *,

@@ -21,6 +21,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.display import Displayed, Facts
 from stepdiag.positions.figures import FIGURES, PositionFigure, figure_facts
 from stepdiag.positions.readings import PositionReadings
+from stepdiag.wrong_arguments import checked
 
 CYCLES_OF_THE_STANDARD: Final = 5
 
@@ -67,6 +68,7 @@ class MeasuredPositions(Displayed):
         return [*(left_out if self.left_out else ()), *figure_facts(self.figures), *self.readings._facts()]
 
 
+@checked
 def evaluate_positions(readings: PositionReadings) -> MeasuredPositions:
     """Evaluate repeated readings of targets: A, E, M, R, B and what belongs to them.
 

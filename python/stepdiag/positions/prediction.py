@@ -24,6 +24,7 @@ from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES
 from stepdiag.positions.figures import FIGURES, PositionFigure, figure_facts, symbol
 from stepdiag.positions.line_effects import LineEffects
+from stepdiag.wrong_arguments import checked
 
 Point = tuple[float, float, float]
 
@@ -62,6 +63,7 @@ class PredictedPositions(Displayed):
         ]
 
 
+@checked
 def axis_line(calibration: Calibration, axis: str, at: Point = (0.0, 0.0, 0.0)) -> tuple[Point, Point]:
     """Start and end of the line along a whole axis, through the point `at`. Raises InvalidArgument."""
     if axis not in AXES or len(axis) != 1:
@@ -71,6 +73,7 @@ def axis_line(calibration: Calibration, axis: str, at: Point = (0.0, 0.0, 0.0)) 
     return _point(start), _point(end)
 
 
+@checked
 def diagonal_line(calibration: Calibration, name: str) -> tuple[Point, Point]:
     """Start and end of a body or face diagonal by its name, such as ppp or np0. Raises InvalidArgument."""
     if len(name) != 3 or not set(name) <= {"p", "n", "0"} or name.count("0") > 1:
@@ -82,6 +85,7 @@ def diagonal_line(calibration: Calibration, name: str) -> tuple[Point, Point]:
     return _point([a for a, _ in ends]), _point([b for _, b in ends])
 
 
+@checked
 def predict_positions(
     calibration: Calibration,
     start: Point,

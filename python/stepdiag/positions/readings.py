@@ -15,6 +15,7 @@ from stepdiag.io.csv_text import finite_number
 from stepdiag.io.file_kind import head_of
 from stepdiag.io.whole_files import read_text
 from stepdiag.units import MICROMETRE
+from stepdiag.wrong_arguments import checked
 
 _REQUIRED: Final = ("target_mm", "direction", "cycle")
 _VALUES: Final = ("deviation_um", "position_mm")
@@ -72,6 +73,7 @@ class PositionReadings(Displayed):
         ]
 
 
+@checked
 def read_positions(path: str | PathLike[str]) -> PositionReadings:
     """Read repeated readings of targets (CSV).
 

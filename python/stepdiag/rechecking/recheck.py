@@ -15,6 +15,7 @@ from stepdiag.scenario.description import Scenario, adjustment_options, reduced_
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
 from stepdiag.units import MICROMETRE, MICRORADIAN
+from stepdiag.wrong_arguments import checked
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -29,6 +30,7 @@ CHANGE_UNITS: Final = {
 }
 
 
+@checked
 def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Recheck:
     """Test whether a machine has changed since its calibration, and estimate the change.
 

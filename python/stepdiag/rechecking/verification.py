@@ -10,11 +10,13 @@ from stepdiag.io.whole_files import read_bytes
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
+from stepdiag.wrong_arguments import checked
 
 # A calibration that is right is refused by one test in a thousand.
 ALPHA: Final = 0.001
 
 
+@checked
 def verify(calibration: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Verification:
     """Predict the readings of a scenario's run from a calibration, and judge the deviations.
 

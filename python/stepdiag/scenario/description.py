@@ -35,6 +35,7 @@ from stepdiag.scenario.plausible_inputs import implausible_air, implausible_colu
 from stepdiag.scenario.setup import counted_with
 from stepdiag.scenario.temperature import scales_of
 from stepdiag.scenario.truth import Truth, errors_of, truth_of
+from stepdiag.wrong_arguments import checked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,6 +127,7 @@ def _reduced(known: Known, measurement: _core.Measurement) -> _core.Measurement:
         return _core.in_recorded_air(run, known.plan, of_run(known.heads), known.assumed_air)
 
 
+@checked
 def evaluate_scenario(
     scenario: Scenario | Known,
     measurement: _core.Measurement,
@@ -229,6 +231,7 @@ def evaluate_beside_adjustment(
     )
 
 
+@checked
 def adjust_scenario(
     scenario: Scenario | Known,
     measurement: _core.Measurement,
@@ -345,12 +348,14 @@ def adjustment_options(
     )
 
 
+@checked
 def read_scenario(path: str | PathLike[str]) -> Scenario:
     """Reads and checks a scenario file. Raises InvalidArgument naming the file and the line or key."""
     with explained(Path(path), "scenario"):
         return parse_scenario(read_text(Path(path)), path)
 
 
+@checked
 def parse_scenario(text: str, path: str | PathLike[str] = "scenario.toml") -> Scenario:
     """A scenario from its text. `path` names it in messages; paths in it are relative to its folder."""
     return scenario_of(parse_toml(text, str(path)), path)

@@ -12,12 +12,14 @@ from stepdiag.config.key_types import Section
 from stepdiag.io.whole_files import read_bytes
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.known import Known
+from stepdiag.wrong_arguments import checked
 
 # Sections of a scenario that choose how readings are evaluated, by method. Others describe machine, plan and head.
 _ALWAYS: Final = ("plausible",)
 _OF_ADJUSTMENT: Final = ("adjustment", "smoothness", "plausible")
 
 
+@checked
 def provenance_of(
     scenario: Scenario | Known,
     run: str | PathLike[str],

@@ -32,6 +32,7 @@ from stepdiag._core import Bins, InvalidArgument, PartialStatistics
 from stepdiag.interruption import at_end, kill_descendants
 from stepdiag.uncertainty.model_source import ModelSource, model_of
 from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
+from stepdiag.wrong_arguments import checked
 
 TASKS_A_THREAD: Final = 2  # submitted at a time: one computed, one waiting
 CONNECT_SECONDS: Final = 10.0
@@ -181,6 +182,7 @@ class Workers:
 
 # --- clusters --------------------------------------------------------------------------------------------------------
 @contextmanager
+@checked
 def workers_of(
     scheduler: str | None = None, count: int | None = None, warn: Warn = lambda _: None
 ) -> Iterator[Workers]:

@@ -29,6 +29,7 @@ from stepdiag._core import (
 from stepdiag.io.file_kind import CHECKPOINT_BEGINS
 from stepdiag.io.outputs import CHECKPOINT, claim
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
+from stepdiag.wrong_arguments import checked
 
 LeafRange = tuple[int, int]  # half-open
 Progress = Callable[[int, int], object]  # samples done, and their total (adaptive: at most)
@@ -47,6 +48,7 @@ class Executor(Protocol):
     def __call__(self, bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]: ...
 
 
+@checked
 def run_monte_carlo(
     model: SampleModel,
     *,

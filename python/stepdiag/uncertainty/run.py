@@ -13,6 +13,7 @@ from stepdiag.scenario.description import Scenario
 from stepdiag.uncertainty.monte_carlo import Executor, run_monte_carlo
 from stepdiag.uncertainty.result import UncertaintyResult, find_output
 from stepdiag.uncertainty.virtual_calibrations import Method, virtual_calibrations
+from stepdiag.wrong_arguments import checked
 
 Vector = tuple[float, float, float]
 Progress = Callable[[int, int], None]  # samples done, and how many there will be
@@ -81,6 +82,7 @@ def model_for(scenario: Scenario, request: UncertaintyRequest) -> tuple[_core.Vi
     return model, entries
 
 
+@checked
 def evaluate_uncertainty(
     scenario: Scenario, request: UncertaintyRequest, progress: Progress | None = None, executor: Executor | None = None
 ) -> UncertaintyResult:

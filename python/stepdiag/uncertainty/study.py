@@ -21,6 +21,7 @@ from stepdiag.scenario.packed import pack_scenario
 from stepdiag.uncertainty.dask_workers import Workers
 from stepdiag.uncertainty.study_cell import CellJob, CellResult, compute_cell
 from stepdiag.uncertainty.study_keys import Cell, Study
+from stepdiag.wrong_arguments import checked
 
 Index = tuple[int, ...]
 CellProgress = Callable[[int, int], None]  # cells done, and their total
@@ -95,6 +96,7 @@ class FinishedCells:
         self.path.unlink(missing_ok=True)
 
 
+@checked
 def run_study(
     study: Study, finished: FinishedCells, *, workers: Workers | None = None, progress: CellProgress | None = None
 ) -> dict[Index, CellResult]:

@@ -30,6 +30,7 @@ from stepdiag.config.key_types import SEED, Format, Section, Seed, format_key, k
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.description import Scenario, scenario_of
+from stepdiag.wrong_arguments import checked
 
 Method = Literal["enhanced", "conventional", "adjustment", "one_step"]
 
@@ -111,6 +112,7 @@ class Study:
                 yield Cell((*place, m), method, ", ".join([*said, f"method = {method}"]), content)
 
 
+@checked
 def read_study(path: str | PathLike[str]) -> Study:
     """Read a study and check the scenario of every cell.
 

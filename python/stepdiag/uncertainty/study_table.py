@@ -19,6 +19,7 @@ from stepdiag.io.netcdf import write_dataset
 from stepdiag.parameters import KINDS
 from stepdiag.uncertainty.study_cell import FIGURES, SUMMARIES, CellResult
 from stepdiag.uncertainty.study_keys import Study
+from stepdiag.wrong_arguments import checked
 
 STUDY_FORMAT: Final = "stepdiag study 1"
 LENGTHS: Final = ("positioning", "straightness")
@@ -56,6 +57,7 @@ def write_study(study: Study, results: Mapping[tuple[int, ...], CellResult], pat
     write_dataset(study_table(study, results), path, _ABOUT | date)
 
 
+@checked
 def study_table(study: Study, results: Mapping[tuple[int, ...], CellResult]) -> xr.Dataset:
     """The results of a study as a labelled table (xarray), in native units: mm, rad.
 

@@ -12,6 +12,7 @@ import xarray as xr
 
 from stepdiag.io.labelled_tables import position_axis
 from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT, FloatArray, UncertaintyResult, label, volume_units
+from stepdiag.wrong_arguments import checked
 
 ABOUT: Final = {
     "format": UNCERTAINTY_FORMAT,
@@ -31,6 +32,7 @@ ABOUT: Final = {
 Column = tuple[str, str, str | None, FloatArray]
 
 
+@checked
 def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
     """The result as a labelled table (xarray), in native units: mm, rad.
 
