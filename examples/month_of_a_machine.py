@@ -79,7 +79,7 @@ def read_on(day: int, plan: str, folder: Path) -> tuple[sd.Scenario, sd.Measurem
     path = folder / f"day{day}.toml"
     path.write_text(SCENARIO.format(seed=day, temperature=temperature, misalignment=misalignment) + plan)
     scenario = sd.read_scenario(path)
-    run = sd.simulate(scenario, machine_on(day))
+    run = sd.simulate(scenario, errors=machine_on(day))
     off = {name: value + 0.1 * rng.normal() for name, value in run.channels.items() if name.startswith("temperature")}
     run = sd.Measurement(run.line, run.point, run.position, {**run.channels, **off})
     run.write(folder / f"day{day}.csv")
