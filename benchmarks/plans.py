@@ -378,9 +378,9 @@ def faults(pool: multiprocessing.pool.Pool, count: int) -> bool:
                 continue
             groups = [outcomes.get((plan, kind, channel, is_scale), []) for is_scale in (False, True)]
             rows.append([plan, name, *predicted_and_seeded(control, groups)])
-    columns = ["plan", "fault", "found from, µm or µrad", "uncontrolled", "told apart, %"]
+    columns = ["plan", "fault", "found from, µm or µrad", "uncontrolled", "distinguished, %"]
     columns += ["unseen up to: positioning, µm", "squareness, µrad", "seeded: worst µm", "worst µrad"]
-    columns += ["found, %: on diagonals", "on scale lines", "told apart, %: on diagonals", "on scale lines"]
+    columns += ["found, %: on diagonals", "on scale lines", "distinguished, %: on diagonals", "on scale lines"]
     return table(
         f"Single faults, head ideal, {STEPS} steps; seeded: {count} of a kind on diagonals, as many on scale lines",
         [*columns, "something determined no more, %: on diagonals", "on scale lines"],

@@ -2277,7 +2277,7 @@ class KnownCombination:
         """
 class FaultControl:
     """
-    Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size, and told from another one where that makes chi-square larger by 25. Twins are not told apart at any size: their effects have a correlation of 0.999 and more, but the calibration differs.
+    Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size, and told from another one where that makes chi-square larger by 25. Twins are not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration differs.
     """
     def __repr__(self) -> str:
         ...

@@ -2,7 +2,7 @@
 
 Every colour has a name by what it means. The sets in USED_TOGETHER appear in one figure; a test
 simulates red-green colour blindness and grey prints for them. Where a set has more members, line
-styles and markers tell them apart as well. Importing this module does not import matplotlib.
+styles and markers distinguish them as well. Importing this module does not import matplotlib.
 """
 
 import io

@@ -47,7 +47,7 @@ def contrast_to_white(colour: str) -> float:
 
 @pytest.mark.parametrize("vision", VISIONS)
 def test_colours_of_one_figure_are_told_apart(vision: str) -> None:
-    # 15: colours of thin lines 1 mm apart are told apart from about 10 on; two of
+    # 15: colours of thin lines 1 mm apart are distinguished from about 10 on; two of
     # the seven of Okabe and Ito have 14 for protanopia.
     for one, other in PAIRS:
         assert distance(COLOUR[one], COLOUR[other], vision) > 15.0, (one, other)

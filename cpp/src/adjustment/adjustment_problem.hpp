@@ -26,7 +26,7 @@ inline constexpr int no_unknown = -1;
 struct AxisNode {
     Axis axis;
     int node;       // 0 .. steps, from home
-    bool negative;  // approached in - direction, where both are told apart
+    bool negative;  // approached in - direction, where both are distinguished
     double position;
     int block = no_unknown;  // in the band; none for the ends of travel
     std::array<int, 6> unknown{no_unknown, no_unknown, no_unknown, no_unknown, no_unknown, no_unknown};

@@ -28,7 +28,7 @@ Candidates with_slips(const FaultHypotheses& hypotheses, const Candidates& candi
     return all;
 }
 
-// Beside a first reading that may be wrong the slip that it may be named as, where nothing tells them apart.
+// Beside a first reading that may be wrong the slip that it may be named as, where nothing distinguishes them.
 Candidates with_names(const FaultHypotheses& hypotheses, const Candidates& members, bool large) {
     Candidates all;
     for (const FaultCandidate& c : members) {

@@ -3,7 +3,7 @@
 // order an adjustment with f as one more unknown finds
 //   f = s/q, u(f) = 1/sqrt(q), s = c.w, q = c.c - (J^T c)^T N^-1 (J^T c), N = J^T J + P,
 // and chi-square becomes less by s^2/q, the square of W. Baarda's test (1968) where c is a single reading. Two faults
-// are told apart as far as their correlation differs from 1, rho = c^T R d/sqrt(q_c q_d), R = I - J N^-1 J^T.
+// are distinguished as far as their correlation differs from 1, rho = c^T R d/sqrt(q_c q_d), R = I - J N^-1 J^T.
 #pragma once
 
 #include <Eigen/Core>

@@ -27,7 +27,7 @@ struct ResidualPattern {
 };
 
 // The group that scatters most conspicuously, then the trends that explain most: the best, and those whose chi-square
-// is less than 25 and less than half of it behind, since the readings do not tell those apart. The equations are
+// is less than 25 and less than half of it behind, since the readings do not distinguish those. The equations are
 // linearised, and factorised, at the solution.
 std::vector<ResidualPattern> residual_patterns(const Adjustment& adjustment, const Measurement& measurement,
                                                const NormalEquations& equations, const BorderedFactor& factor);

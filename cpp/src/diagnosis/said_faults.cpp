@@ -81,7 +81,7 @@ std::vector<FaultClass> said_faults(const FaultContext& context, const FaultStat
             compare(found.members, context.test_near(without(state.found, k), *state.solution), values, entry);
         classes.push_back(std::move(entry));
     }
-    // Several slips that are not told apart may be other pairs than these: no class says so.
+    // Several slips that are not distinguished may be other pairs than these: no class says so.
     const auto is_doubtful = [&](const FaultClass& entry) { return !entry.told_apart() && !has_reading(entry); };
     if (std::count_if(classes.begin(), classes.end(), is_doubtful) > 1)
         for (FaultClass& entry : classes)

@@ -92,7 +92,7 @@ bool leave_out_one(const Run& run, AdjustmentProblem& problem, const Judge& judg
     return true;
 }
 
-// The same for any number of faults. What is known tells single readings apart better than the run by itself does; of
+// The same for any number of faults. What is known distinguishes single readings better than the run by itself does; of
 // all else the run's own faults are left out, and then perhaps one more reading.
 template <class Judge>
 auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, const Judge& judge) {

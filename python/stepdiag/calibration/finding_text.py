@@ -31,7 +31,7 @@ LARGEST_ANGLE: Final = 0.1  # rad: twenty times what is plausible
 REASONS: Final = {
     "not_seen": "",
     "not_moved": "no reading on a line that moves the axis to its end",
-    "not_separated": "the readings do not tell them apart",
+    "not_separated": "the readings do not distinguish them",
     "tool_rotations": "its line does not tell it from rotations that move the tool",
     "few_tilts": "with tilts",
     "few_lengths": "with distance, tilts and known angles",
@@ -123,7 +123,7 @@ NOISE_ALONE: Final = {
     "neither in them nor corrected",
 }
 # Of what is accepted.
-NOT_SEEN: Final = "note: no fit shows a wrong wavelength, temperature, tool offset or place of b in the chain"
+NOT_SEEN: Final = "note: a good fit does not prove that wavelength, temperature, tool offset and place of b are right"
 
 
 def undetermined_text(finding: Undetermined) -> str:
@@ -453,7 +453,7 @@ def _treatment(found: FaultClass) -> str:
 
 
 def reason_texts(reasons: Sequence[FitReason]) -> list[str]:
-    """The reasons of a verdict, a sentence each; trends that the readings do not tell apart share one."""
+    """The reasons of a verdict, a sentence each; trends that the readings do not distinguish share one."""
     texts: list[str] = []
     alternatives: dict[int, list[str]] = {}  # by the text that they belong to
     for reason in reasons:

@@ -161,7 +161,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     Adjusts an error-free run with the scenario's uncertainties and unknowns. Reports which of the
     21 parameters and of the set-up's unknowns the readings determine, their standard uncertainties,
     what is missing for the others, which faults of single readings and slips of a counter would be
-    found and told apart, and how the largest uncertainties grow with the number of steps.
+    found and distinguished, and how the largest uncertainties grow with the number of steps.
     """
     from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.fault_control import extensions, tells_all

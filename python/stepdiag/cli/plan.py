@@ -202,7 +202,8 @@ def plan(
     choice = choose(found, aim)
     say(inputs_row(known))
     say("largest standard uncertainties by measuring time, for a machine with usual errors (lines: body diagonals/face")
-    say("diagonals/single axes/scale lines; found: smallest wrong distance that is; told: kinds of faults told apart):")
+    say("diagonals/single axes/scale lines; found: smallest wrong distance that is found; told: kinds of faults that")
+    say("are distinguished):")
     for line in plan_rows(shown(found, choice, aim), choice, aim):
         say(line)
     own = own_candidate(known)
@@ -211,7 +212,7 @@ def plan(
         say(line)
     if choice.taken is not None:
         say(f"  {line_names(choice.taken)}")
-        with Progress("plans that tell all faults apart"):
+        with Progress("plans that distinguish all faults"):
             told_apart = telling(described, found, choice.taken, family)
         for line in fault_advice(*told_apart):
             say(line)

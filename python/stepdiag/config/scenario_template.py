@@ -20,8 +20,8 @@ PLAN: Final = {
 WHY: Final = (
     "The best plan for 45 minutes with nodes 80 mm apart (`stepdiag plan scenario.toml --minutes 45`), by noise alone "
     "of 0.1 µm and 1 µrad: it takes 42.1 minutes, the functional point has u of at most 0.9 µm in the volume, and "
-    "all kinds of faults of readings are told apart. Once, without pp0 and with scale lines read at their ends: 27.8 "
-    "minutes, 1.52 µm, and a wrong distance is not told from its twin."
+    "all kinds of faults of readings are distinguished. Once, without pp0 and with scale lines read at their ends: "
+    "27.8 minutes, 1.52 µm, and a wrong distance is not distinguished from its twin."
 )
 
 

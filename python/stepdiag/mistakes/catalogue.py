@@ -257,7 +257,7 @@ def _factor(
         f"{_both(channels)} {verb} too {size} {where}: {why}",
         f"in the run multiply {columns(copy, channels)} by {1.0 / factor:.6g}{_rows(lines)}",
         scaled(channels, 1.0 / factor, lines),
-        # Of distances nothing is for nothing: any factor leads them off the plan's way.
+        # A factor makes the residuals of tilts smaller by itself. Distances with a factor contradict the plan.
         chosen
         + (0.0 if channels[0] in distances_of(copy.known) else len(channels) * count * max(0.0, 1.0 - factor**-2)),
     )

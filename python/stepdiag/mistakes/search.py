@@ -271,7 +271,7 @@ class MistakeSearch:
         return [pair for first in self._begun(self._single) for pair in self._with_second(first)]
 
     def _begun(self, tried: list[_Tried]) -> list[_Tried]:
-        """Mistakes that explain a part. What the readings do not tell apart begins once."""
+        """Mistakes that explain a part. What the readings do not distinguish begins once."""
         begun: list[_Tried] = []
         for one in sorted(tried, key=lambda one: one.fit.square_sum):
             # The larger of two mistakes makes more of the misfit than the other.
@@ -292,7 +292,7 @@ class MistakeSearch:
                     f"{a.text}, and {b.text}",
                     f"{a.edit}; then {b.edit}",
                     in_turn(a.change, b.change),
-                    a.free + b.free + 10.0,  # of so many pairs
+                    a.free + b.free + 10.0,  # the number of pairs that are compared
                 ),
                 second.fit,
             )

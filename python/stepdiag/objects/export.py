@@ -63,7 +63,7 @@ class ExportObject(TypedDict):
 def export_object(
     done: Export, calibration: Calibration, to: str, file: Path, fit_warnings: Sequence[str]
 ) -> ExportObject:
-    """What an export has written, and what it leaves."""
+    """The files of an export, and the errors that remain."""
     warnings = [line.removeprefix("warning: ") for line in done.report if line.startswith("warning: ")]
     with_fitted = done.values.get("with_fitted")
     return {

@@ -99,9 +99,9 @@ class ObservationObject(TypedDict):
     setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
     """Values are 0."""
     reliability: list[LengthControl | AngleControl]
-    """Which faults of the readings would be found and told apart."""
+    """Which faults of the readings would be found and distinguished."""
     extensions: list[ExtendedPlan]
-    """Plans with more in them; empty if the plan tells all faults apart."""
+    """Plans with more in them; empty if the plan distinguishes all faults."""
     by_steps: list[StepsObject]
     exponents: GrowthExponents
     notes: list[str]

@@ -231,7 +231,7 @@ class _Search:
         seconds = self.seconds(candidate)
         spacing = float(max(self.known.plan.volume)) / candidate.steps
         nothing = Outcome(candidate, seconds, spacing, (math.nan, math.nan), {}, frozenset())
-        # Two runs tell faults apart that one does not.
+        # Two runs distinguish faults that one does not.
         repeats = min(candidate.repeats, 2 if self.faults else 1)
         steps = self.few if candidate.steps >= few else (candidate.steps, candidate.steps)
         at = [self._screen(self._standing_for(candidate, n, repeats)) for n in steps]

@@ -20,7 +20,7 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
     others."""
     yield "faults that the readings control, one at a time: found (99 %) from which size on, the largest effect of a"
     yield "fault just not found, and from which size on it is told from all others:"
-    yield f"  {'':<18}{'found from':>14}" + "".join(f"{kind:>14}" for kind in KINDS) + "  told apart"
+    yield f"  {'':<18}{'found from':>14}" + "".join(f"{kind:>14}" for kind in KINDS) + "  distinguished"
     yield f"  {'':<18}{'':>14}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
     for c in controls:
         cells = "".join(f"{_hidden(c, kind):>14}" for kind in KINDS)
@@ -34,7 +34,7 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
 
 
 def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[str]:
-    """What would tell apart or control what the plan does not; nothing where it does."""
+    """What would distinguish or control what the plan does not; nothing where it does."""
     from stepdiag.planning.fault_control import tells_all  # reports of evaluations need none of that room
 
     if tells_all(own):
@@ -44,7 +44,7 @@ def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") ->
             yield f"  {extension.name}: {extension.trouble}"
             continue
         said = "; ".join(f"{name(c)} {told_apart(c)}" for c in extension.controls)
-        yield f"  {extension.name} ({extension.minutes:+.1f} minutes), told apart: {said}"
+        yield f"  {extension.name} ({extension.minutes:+.1f} minutes), distinguished: {said}"
 
 
 def name(control: FaultControl) -> str:

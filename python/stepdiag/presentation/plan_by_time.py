@@ -95,7 +95,7 @@ def _cell(kind: Kind, one: Outcome) -> str:
 
 
 def _faults(one: Outcome) -> list[str]:
-    """The smallest wrong distance that is found, and how many kinds of faults are told apart."""
+    """The smallest wrong distance that is found, and how many kinds of faults are distinguished."""
     if not one.faults:
         return ["", ""]
     size = found_from(one.faults)
@@ -144,14 +144,14 @@ def own_row(own: Outcome) -> str:
 
 
 def fault_advice(taken: Outcome, telling: Outcome | None) -> Iterator[str]:
-    """Whether faults of the readings are told apart in the plan to take, and which plan would."""
-    yield f"faults told apart in the plan to take: {_told(taken)}"
+    """Whether faults of the readings are distinguished in the plan to take, and which plan would."""
+    yield f"faults distinguished in the plan to take: {_told(taken)}"
     if telling is None:
-        yield "no plan of as many steps that is as certain tells all faults apart"
+        yield "no plan of as many steps that is as certain distinguishes all faults"
     elif telling is not taken:
         more = telling.minutes - taken.minutes
         yield (
-            f"all faults told apart: {_named(telling)}, in {telling.minutes:.1f} minutes ({more:+.1f}): "
+            f"all faults distinguished: {_named(telling)}, in {telling.minutes:.1f} minutes ({more:+.1f}): "
             f"{_told(telling)}"
         )
 

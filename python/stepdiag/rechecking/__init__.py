@@ -1,1 +1,1 @@
-"""Is the last calibration still true: new readings against it."""
+"""Is the last calibration still valid: new readings against it."""

@@ -71,7 +71,7 @@ TEST(Decimal, ShiftIsExactWhereAMultiplicationWouldRoundTwice) {
         EXPECT_EQ(bits(*parse_decimal(digits, -6)), bits(expected)) << digits;
         differs += std::strtod(digits.c_str(), nullptr) * 1e-6 != expected;
     }
-    EXPECT_GT(differs, 0);  // the test can tell the two apart
+    EXPECT_GT(differs, 0);  // the test can distinguish the two
 }
 
 TEST(Decimal, ShortestTextIsWritten) {

@@ -1,4 +1,4 @@
-"""The commands check and init: telling files apart, and beginning with new ones."""
+"""The commands check and init: distinguishing files, and beginning with new ones."""
 
 import re
 from pathlib import Path

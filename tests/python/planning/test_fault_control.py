@@ -180,7 +180,7 @@ def test_observe_says_what_would_tell_faults_apart(scenario: str, capsys: pytest
 def test_evaluate_says_on_demand_what_would_have_been_found(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", scenario, "-o", "run.csv"]) == 0
     assert main(["evaluate", scenario, "run.csv", "-o", "out.csv"]) == 0
-    assert "told apart" not in capsys.readouterr().out
+    assert "distinguished" not in capsys.readouterr().out
     assert main(["evaluate", scenario, "run.csv", "--reliability", "-o", "out.csv"]) == 0
     assert "wrong distance" in capsys.readouterr().out
     assert main(["evaluate", scenario, "run.csv", "--reliability", "-m", "enhanced", "-o", "out.csv"]) == 2

@@ -283,7 +283,7 @@ def test_plan_that_tells_faults_apart_is_named_with_its_minutes() -> None:
     assert telling_all.candidate == twice.candidate
     assert not any(c.twins or c.uncontrolled for c in telling_all.faults)
     said = list(fault_advice(taken, telling_all))
-    assert said[0].startswith("faults told apart in the plan to take: wrong distance none; slip of distances none; ")
+    assert said[0].startswith("faults distinguished in the plan to take: wrong distance none; slip of distances none; ")
     assert f"(+{twice.minutes - once.minutes:.1f})" in said[1]
     assert len(list(fault_advice(telling_all, telling_all))) == 1
     assert telling(scenario, [once], once)[1] is None
@@ -305,7 +305,7 @@ def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFi
     assert Path("plan.png").read_bytes().startswith(b"\x89PNG")
     (row,) = [line for line in said.splitlines() if line.lstrip().startswith("* ")]
     assert float(row.split()[1]) <= 20.0
-    assert "\nfaults told apart in the plan to take: " in said
+    assert "\nfaults distinguished in the plan to take: " in said
 
 
 @pytest.mark.slow

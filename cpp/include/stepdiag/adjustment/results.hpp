@@ -105,7 +105,7 @@ enum class FaultTreatment { none, left_out, estimated };
 std::string name(FaultTreatment treatment);  // "none", ...
 
 // Faults of which the readings do not tell which one happened: the gains of all others are behind by 25 and more. Those
-// of single readings come with the readings that only they control, even where second order tells them apart. A wrong
+// of single readings come with the readings that only they control, even where second order distinguishes them. A wrong
 // first reading is also a slip of all later ones, where the constant of its channel is free: both are named.
 struct FaultClass {
     std::vector<Fault> members;  // the best first

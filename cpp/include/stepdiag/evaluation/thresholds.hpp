@@ -26,7 +26,7 @@ struct Thresholds {
     double most_faults = 0.1;      // of a channel, by its redundancy; one in any case
     double fault_cost = 2.0;       // times as large an uncertainty, by what was done about faults, at most
     double alternative = 25.0;     // what is less behind the best may be it
-    double second_order = 1000.0;  // gain from which second order may tell faults apart
+    double second_order = 1000.0;  // gain from which second order may distinguish faults
     double gross_scatter = 25.0;   // of the square sum a reading: values far from any machine
     double mistake = 60.0;         // least gain of a mistake in the whole run
     double chance = 9.0;           // difference that does not make one mistake better than another

@@ -24,7 +24,7 @@ std::string name(OpenPart part);  // "whole", ...
 enum class OpenReason {
     not_seen,         // the readings do not tell it
     not_moved,        // no line with readings moves the axis to its end
-    not_separated,    // the readings do not tell these parameters apart
+    not_separated,    // the readings do not distinguish these parameters
     tool_rotations,   // the axis' own line does not tell it from rotations that move the tool
     few_tilts,        // a step was read on too few lines: with tilts,
     few_lengths,      // with distance, tilts and known angles,

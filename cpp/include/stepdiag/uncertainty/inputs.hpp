@@ -75,7 +75,7 @@ struct ReadingNoise {
 // Name in reports: "noise of distance", "common noise", "head walk", "machine walk x", "position x", "orientation x".
 std::string name(const ReadingNoise& noise);
 
-// What there is to be uncertain: the set-up quantities, then the shared ones and the noises.
+// The quantities that can be uncertain: the set-up quantities, then the shared ones and the noises.
 struct UncertainQuantity {
     enum class Of { line, part, head, air, machine, scale, noise };
     std::string_view name;
