@@ -16,7 +16,7 @@ NAMES = [*public_names()]
 
 def test_every_public_name_stands_once_in_the_reference() -> None:
     pages = "\n".join(page.read_text(encoding="utf-8") for page in (REFERENCE / "python").glob("*.md"))
-    documented = re.findall(r"^\.\. auto(?:class|function|exception):: ([\w.]+)$", pages, re.M)
+    documented = re.findall(r"^\.\. auto(?:class|function|exception):: (?:stepdiag\.)?([\w.]+)$", pages, re.M)
     assert sorted(documented) == sorted(NAMES)
 
 
