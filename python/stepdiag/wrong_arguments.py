@@ -6,7 +6,8 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple, ParamSpec, TypeVar
+from types import UnionType
+from typing import Any, Final, Literal, NamedTuple, ParamSpec, TypeVar, Union, get_args, get_origin
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -112,8 +113,6 @@ def _fits_one(value: Any, text: str) -> bool:
             return isinstance(value, os.PathLike)
         case "Annotated":
             return fits(value, inside[0])
-        case "Union" | "Optional":
-            return (name == "Optional" and value is None) or any(fits(value, one) for one in inside)
         case "Literal":
             return repr(value) in (word.replace('"', "'") for word in inside)
         case "Sequence" | "list" | "tuple" | "Iterable":
@@ -161,10 +160,8 @@ def expected(type_text: str) -> str:
             said = "a sequence" + (f" ({expected(inside[0])} each)" if inside else "")
         elif name in ("Mapping", "dict"):
             said = f"a mapping (to {expected(inside[1])} each)" if len(inside) > 1 else "a mapping"
-        elif name in ("Annotated", "Optional"):
+        elif name == "Annotated":
             said = expected(inside[0])
-        elif name == "Union":
-            said = " or ".join(expected(each) for each in inside)
         elif name == "Literal":
             said = "one of " + ", ".join(inside)
         else:
@@ -232,10 +229,19 @@ def _annotated(function: Callable[..., Any]) -> Signature:
 
 
 def _text_of(kind: Any) -> str:
-    if isinstance(kind, type) and not hasattr(kind, "__args__"):
-        return kind.__name__
-    text = str(kind)
-    return "ArrayLike" if "_SupportsArray" in text else text
+    """The text of an annotation; a protocol is whatever has its methods."""
+    if "_SupportsArray" in str(kind):
+        return "ArrayLike"
+    if getattr(kind, "_is_protocol", False):
+        return "object"
+    if kind is type(None):
+        return "None"
+    origin, inside = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return " | ".join(map(_text_of, inside))
+    if origin in (None, Literal, Callable) or not inside:
+        return kind.__name__ if isinstance(kind, type) else str(kind)
+    return f"{origin.__name__}[{', '.join(map(_text_of, inside))}]"
 
 
 def _generic(text: str) -> tuple[str, list[str]]:

@@ -207,7 +207,7 @@ def test_the_kinematics_table_is_the_calibration_to_the_last_bit(tmp_path: Path)
     ).calibration
     assert calibration.reversal
     report = export(calibration, "linuxcnc-kins", tmp_path / "table.csv", incomplete=True)
-    calibration.write(tmp_path / "calibration.csv")
+    calibration.write_csv(tmp_path / "calibration.csv")
     assert (tmp_path / "table.csv").read_bytes() == (tmp_path / "calibration.csv").read_bytes()
     assert any("stepdiagkins" in line and "chain=wXbYZt" in line for line in report)
 

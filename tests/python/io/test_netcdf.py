@@ -15,6 +15,7 @@ from usual import CHAIN, DIAGONALS
 
 import stepdiag as sd
 from stepdiag.calibration.finding_text import combination_text
+from stepdiag.io.data_files import write_calibration
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +189,7 @@ def test_outliers_are_in_the_file(adjustment: tuple[sd.Adjustment, sd.Measuremen
     other = SimpleNamespace(
         row=3, run=0, line="ppp", point=3, channel="alpha", residual=-1e-4, normalised=-21.5, number=2
     )
-    cast(Any, WithOutliers(adjustment[0], [worst, other])).write(tmp_path / "calibration.nc")
+    write_calibration(cast(Any, WithOutliers(adjustment[0], [worst, other])), tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
         for name in ("row", "run", "line", "point", "channel", "residual", "number"):
             assert table[f"outlier_{name}"].values.tolist() == [getattr(worst, name), getattr(other, name)]

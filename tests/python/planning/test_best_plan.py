@@ -184,7 +184,7 @@ def test_verdict_of_volume_is_the_one_that_the_goal_promises() -> None:
         told = []
         for seed in range(20):
             noisy = parse_scenario(NOISY.replace("tilt_urad = 1.0", f"tilt_urad = 1.0\nseed = {seed}"))
-            run = sd.simulate(noisy, scaled)
+            run = sd.simulate(noisy, errors=scaled)
             known = noisy.known
             calibration = sd.methods.adjust_scenario(known, run, full_covariance=True).calibration
             told.append(sd.volume(calibration, limit=limit, between_nodes=0.0, ranking=False, samples=1000).verdict)
