@@ -448,7 +448,8 @@ void bind_result(py::module_& m) {
         "Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found "
         "with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of "
         "its size, and told from another one where that makes chi-square larger by 25. Twins are "
-        "not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration differs.")
+        "not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration "
+        "differs.")
         .def_property_readonly(
             "kind", [](const FaultControl& c) { return name(c.kind); },
             "\"reading\", \"slip\": an offset of its channel from a reading on, or \"factor\" on a line's distances.")

@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "bindings.hpp"
-#include "wrong_arguments.hpp"
 #include "stepdiag/version.hpp"
+#include "wrong_arguments.hpp"
 
 namespace stepdiag::bindings {
 
