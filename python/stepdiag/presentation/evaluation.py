@@ -81,7 +81,6 @@ def _adjusted(
     yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)
     yield from budget_rows(calibration)
-    yield from unseen_rows(calibration)
     yield from reversal_rows(calibration)
     rows = list(setup_rows(adjustment.setup, [*known.plan.lines, *known.plan.scale_lines]))
     if rows:
@@ -91,6 +90,8 @@ def _adjusted(
     yield from machine_drift_rows(adjustment.machine_drift, known)
     yield from undetermined_rows(calibration, map(combination_text, adjustment.combinations))
     yield from smoothness_rows(adjustment.smoothness)
+    # Caveats come last: the first screen is for the result.
+    yield from unseen_rows(calibration)
     yield from cosine_rows(measurement, known)
     yield from drift_rows(measurement, known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
