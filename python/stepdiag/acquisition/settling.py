@@ -11,6 +11,7 @@ from typing import Literal
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.instrument import EXPONENTS, Number, ReadColumn, Row, Sample
+from stepdiag.option_field import option
 
 
 @dataclass(frozen=True)
@@ -19,15 +20,20 @@ class Settling:
 
     Raises InvalidArgument naming the field."""
 
-    count: int = 5  # consecutive values that must agree
-    # Largest range of these in every column, and largest distance of averaged values from their mean.
-    limit_um: float = 0.5  # of distances
-    limit_spot_um: float = 5.0
-    limit_tilt_urad: float = 5.0
-    timeout: float = 20.0  # s; after that the reading is lost
-    average: int = 10  # number of values
-    interval: float = 0.01  # s between two values
-    retries: int = 5  # consecutive values without a beam before the beam counts as lost
+    count: int = option(5, "Values in a row that must agree.", name="settle_count", least=2)
+    # Also the largest distance of averaged values from their mean.
+    limit_um: float = option(0.5, "Largest range of these values, of distances.", name="settle_limit_um", above=0.0)
+    limit_spot_um: float = option(5.0, "Largest range of these values, of spots.", name="settle_spot_um", above=0.0)
+    limit_tilt_urad: float = option(5.0, "Largest range of these values, of tilts.", name="settle_tilt_urad", above=0.0)
+    timeout: float = option(
+        20.0,
+        "Seconds to wait for settled values; after that the reading is lost.",
+        name="settle_timeout",
+        above=0.0,
+    )
+    average: int = option(10, "Values to average after settling.", least=1)
+    interval: float = option(0.01, "Time between two values.", name="interval_ms", least=0.0, factor=1e-3)  # s
+    retries: int = option(5, "Consecutive values without a beam before the beam counts as lost.", least=0)
     retry_wait: float = 0.1  # s between these
 
     def __post_init__(self) -> None:

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.options import AcquireOptions
+from stepdiag.acquisition.settling import Settling
+from stepdiag.cli.field_options import made_of, options_of
 from stepdiag.cli.interrupts import unwinding
 from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell, tell_inputs
 from stepdiag.cli.terminal import plain
@@ -15,7 +18,6 @@ from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
 if TYPE_CHECKING:
-    from stepdiag.acquisition.options import AcquireOptions
     from stepdiag.acquisition.triggers import Trigger
     from stepdiag.acquisition.visit_loop import Resume
     from stepdiag.twin.server import Twin
@@ -76,94 +78,13 @@ class _Terminal:
     metavar="WHAT",
     help="When to read: key (at Enter), settle (at rest one step on), or tcp://HOST:PORT (at a controller's request).",
 )
-@click.option(
-    "--axes", metavar="N,N,N", help="Axes of the IDS3010 that give d1, d2, d3 (or distance).  [default: 1,2,3]"
-)
-@click.option(
-    "--sign",
-    type=click.Choice(["+", "-"]),
-    default="+",
-    show_default=True,
-    help="Use - if the instrument's positions decrease as the distance increases.",
-)
-@click.option(
-    "--zero",
-    type=click.Choice(["none", "first"]),
-    default="none",
-    show_default=True,
-    help="first: subtract a constant for each set-up and beam; its first reading becomes the nominal distance.",
-)
-@click.option(
-    "--settle-count", type=click.IntRange(2), default=5, show_default=True, help="Values in a row that must agree."
-)
-@click.option(
-    "--settle-limit-um",
-    type=SECONDS,
-    default=0.5,
-    show_default=True,
-    help="Largest range of these values, of distances.",
-)
-@click.option(
-    "--settle-spot-um",
-    type=SECONDS,
-    default=5.0,
-    show_default=True,
-    help="Largest range of these values, of spots.",
-)
-@click.option(
-    "--settle-tilt-urad",
-    type=SECONDS,
-    default=5.0,
-    show_default=True,
-    help="Largest range of these values, of tilts.",
-)
-@click.option(
-    "--settle-timeout",
-    type=SECONDS,
-    default=20.0,
-    show_default=True,
-    help="Seconds to wait for settled values; after that the reading is lost.",
-)
-@click.option(
-    "--average", type=click.IntRange(1), default=10, show_default=True, help="Values to average after settling."
-)
-@click.option(
-    "--interval-ms", type=click.FloatRange(min=0.0), default=10.0, show_default=True, help="Time between two values."
-)
-@click.option(
-    "--retries",
-    type=click.IntRange(0),
-    default=5,
-    show_default=True,
-    help="Consecutive values without a beam before the beam counts as lost.",
-)
-@click.option(
-    "--timeout", type=SECONDS, default=2.0, show_default=True, help="Seconds to wait for an answer of the instrument."
-)
-@click.option(
-    "--wait-timeout", type=SECONDS, default=3600.0, show_default=True, help="Seconds to wait for the next point."
-)
-@click.option(
-    "--start",
-    type=click.Choice(["auto", "never"]),
-    default="auto",
-    show_default=True,
-    help="auto: restart the instrument's measurement at a set-up if it is stopped or reports a warning.",
-)
+@options_of(AcquireOptions, Settling)
 @click.option(
     "--temperatures",
     type=PATH,
     metavar="FILE",
     help="CSV file that another program appends to: time, temperature_c or temperature_x_c ..., air_temperature_c ...",
 )
-@click.option(
-    "--temperature-age",
-    type=SECONDS,
-    default=600.0,
-    show_default=True,
-    help="Seconds that a row of this file may be away from a reading.",
-)
-@click.option("--uncertainties", is_flag=True, help="Also write the standard deviation of each mean (u_d1_um ...).")
 @click.option(
     "--raw", type=Writes(RAW), metavar="FILE", help="Raw file (.jsonl).  [default: beside the output, run.raw.jsonl]"
 )
@@ -227,7 +148,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
 
-def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
+def _convert(raw: Path, output: OutputFile, options: AcquireOptions) -> None:
     from stepdiag.acquisition.acquire import raw_path
     from stepdiag.acquisition.raw_file import read_raw
     from stepdiag.acquisition.run_from_raw import write_run
@@ -248,39 +169,8 @@ def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
     click.echo(f"wrote {path}: {len(content.readings())} of {content.planned} readings")
 
 
-def _options(given: dict[str, Any]) -> "AcquireOptions":
-    from stepdiag.acquisition.options import AcquireOptions
-    from stepdiag.acquisition.settling import Settling
-
-    return AcquireOptions(
-        axes=_axes(given["axes"]),
-        sign=1 if given["sign"] == "+" else -1,
-        settling=Settling(
-            count=given["settle_count"],
-            limit_um=given["settle_limit_um"],
-            limit_spot_um=given["settle_spot_um"],
-            limit_tilt_urad=given["settle_tilt_urad"],
-            timeout=given["settle_timeout"],
-            average=given["average"],
-            interval=given["interval_ms"] * 1e-3,
-            retries=given["retries"],
-        ),
-        zero=given["zero"],
-        uncertainties=given["uncertainties"],
-        start=given["start"],
-        timeout=given["timeout"],
-        wait_timeout=given["wait_timeout"],
-        temperature_age=given["temperature_age"],
-    )
-
-
-def _axes(text: str | None) -> tuple[int, ...] | None:
-    if text is None:
-        return None
-    words = [word.strip() for word in text.split(",")]
-    if not all(word.isascii() and word.isdigit() and len(word) < 4 for word in words):
-        raise InvalidArgument(f"--axes: expected numbers with commas between them, such as 1,2,3, got {text!r}")
-    return tuple(int(word) for word in words)
+def _options(given: dict[str, Any]) -> AcquireOptions:
+    return made_of(AcquireOptions, given, settling=made_of(Settling, given))
 
 
 def _resume(given: dict[str, Any]) -> "Resume | None":
