@@ -10,9 +10,8 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.settling import Settling
-from stepdiag.cli.field_options import made_of, options_of
 from stepdiag.cli.interrupts import unwinding
-from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell, tell_inputs
+from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, made_of, options_of, out_file, tell, tell_inputs
 from stepdiag.cli.terminal import plain
 from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
