@@ -176,13 +176,7 @@ def volume(
     machine, offset = _machine_of(source, tool)
     corners = _box_of(source, box)
     positions, every_node = _positions(machine, corners, grid)
-    for name, length in (("limit", limit), ("between_nodes", between_nodes)):
-        if length is not None and not (math.isfinite(length) and length >= 0.0):
-            raise InvalidArgument(f"`{name}`: expected a length of at least 0 mm, got {length:g}")
-    if limit == 0.0:
-        raise InvalidArgument("`limit`: expected a length above 0 mm, got 0")
-    if samples < FEWEST_SAMPLES:
-        raise InvalidArgument(f"samples: expected at least {FEWEST_SAMPLES}, got {samples}")
+    _check_numbers(limit, between_nodes, samples)
     found = _core.summarise_volume(machine, *positions)
     missing = _missing(source, offset)
     known = not any(component in missing for component in AXES)
@@ -195,7 +189,8 @@ def volume(
     for name in values:
         if not (known if name in ("largest", "rms", *DIAGONALS) else name[-1] not in missing):
             values[name] = math.nan
-    spreads, chosen = {}, None
+    spreads: dict[str, Spread] = {}
+    chosen = None
     if isinstance(source, Calibration) and source.covariance is not None:
         drawn_at = tuple(_thinned(axis, MOST_DRAWN) for axis in positions)
         draws = _core.VolumeDraws(source, *drawn_at, tool=offset, seed=seed)
@@ -238,6 +233,16 @@ def volume(
         fit=source.fit if isinstance(source, Calibration) else None,
     )
     return judged(not_judged, limit=limit)
+
+
+def _check_numbers(limit: float | None, between_nodes: float | None, samples: int) -> None:
+    for name, length in (("limit", limit), ("between_nodes", between_nodes)):
+        if length is not None and not (math.isfinite(length) and length >= 0.0):
+            raise InvalidArgument(f"`{name}`: expected a length of at least 0 mm, got {length:g}")
+    if limit == 0.0:
+        raise InvalidArgument("`limit`: expected a length above 0 mm, got 0")
+    if samples < FEWEST_SAMPLES:
+        raise InvalidArgument(f"samples: expected at least {FEWEST_SAMPLES}, got {samples}")
 
 
 def without_between_nodes(found: VolumeErrors) -> VolumeErrors:

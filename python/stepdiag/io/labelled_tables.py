@@ -135,43 +135,41 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         variables[name] = ((), angle, attributes)
         variables[f"{name}_u"] = ((), angle_uncertainty, _uncertainty_of(attributes))
     variables |= _covariance(calibration)
-    verdict: dict[str, Any] = {}
-    if calibration.fit is not None:
-        verdict["fit"] = calibration.fit
-    if calibration.variance_factor is not None:
-        verdict["variance_factor"] = calibration.variance_factor
-    if calibration.uncertainty_scaled is not None:
-        verdict["uncertainty_scaled"] = calibration.uncertainty_scaled
-    if calibration.between_nodes is not None:
-        verdict["between_nodes_mm"] = calibration.between_nodes
-    if calibration.temperature_reference is not None:
-        verdict["temperature_reference_c"] = calibration.temperature_reference
-    elif calibration.temperature_as_found is not None:
-        verdict["temperature_as_found_c"] = calibration.temperature_as_found
+    return xr.Dataset(variables, coordinates, _attributes(calibration))
+
+
+def _attributes(calibration: Calibration) -> dict[str, Any]:
+    """Verdict and conditions, what it was made from, and for which machine. What is not stated is absent."""
+    stated = {
+        "fit": calibration.fit,
+        "variance_factor": calibration.variance_factor,
+        "uncertainty_scaled": calibration.uncertainty_scaled,
+        "between_nodes_mm": calibration.between_nodes,
+        "temperature_reference_c": calibration.temperature_reference,
+    }
+    attributes: dict[str, Any] = {name: value for name, value in stated.items() if value is not None}
+    if calibration.temperature_reference is None and calibration.temperature_as_found is not None:
+        attributes["temperature_as_found_c"] = calibration.temperature_as_found
     if calibration.expansion is not None:
-        verdict["expansion_per_k"] = calibration.expansion
-        verdict["fixed_point_mm"] = calibration.fixed_point
-    verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
-    verdict["unseen_faults"] = "\n".join(calibration.unseen_faults)
-    verdict["conditions"] = "\n".join(calibration.conditions)
-    verdict["budget"] = calibration.budget
-    return xr.Dataset(
-        variables,
-        coordinates,
-        verdict
-        | unverified_key(calibration)
-        | calibration.provenance
-        | {
-            "title": "calibration of a three-axis machine",
-            "method": calibration.method,
-            "date": calibration.date,
-            "chain": calibration.chain.name,
-            "volume_mm": calibration.volume,
-            "tool_mm": calibration.tool,
-            "straightness_reference": calibration.straightness_reference,
-            "undetermined": "\n".join(calibration.undetermined),
-        },
-    )
+        attributes["expansion_per_k"] = calibration.expansion
+        attributes["fixed_point_mm"] = calibration.fixed_point
+    return {
+        **attributes,
+        "fit_reasons": "\n".join(calibration.fit_reasons),
+        "unseen_faults": "\n".join(calibration.unseen_faults),
+        "conditions": "\n".join(calibration.conditions),
+        "budget": calibration.budget,
+        **unverified_key(calibration),
+        **calibration.provenance,
+        "title": "calibration of a three-axis machine",
+        "method": calibration.method,
+        "date": calibration.date,
+        "chain": calibration.chain.name,
+        "volume_mm": calibration.volume,
+        "tool_mm": calibration.tool,
+        "straightness_reference": calibration.straightness_reference,
+        "undetermined": "\n".join(calibration.undetermined),
+    }
 
 
 def channel_units(name: str) -> str | None:
