@@ -45,6 +45,15 @@ def test_compensation_leaves_as_much_as_readme_says() -> None:
     assert f"falls from {before} to {after} µm" in readme
 
 
+def test_measurement_takes_as_long_as_readme_says(tmp_path: Path) -> None:
+    said = output_of(
+        "-m", "stepdiag", "nc", EXAMPLES / "better_plan.toml", "-o", tmp_path / "run.ngc", "--dialect", "iso"
+    )
+    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    minutes, set_ups = (words.split()[-1] for words in said.split(" min")[:2])
+    assert f"takes {minutes} minutes, {float(set_ups):g} of them for set-ups" in " ".join(readme.split())
+
+
 def test_report_page_has_what_evaluate_prints(tmp_path: Path) -> None:
     run, out = tmp_path / "run.csv", tmp_path / "calibration.csv"
     sd.simulate(sd.read_scenario(EXAMPLES / "scenario.toml")).write(run)
