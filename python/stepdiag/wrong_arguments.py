@@ -107,9 +107,7 @@ def _fits_one(value: Any, text: str) -> bool:
             return not isinstance(value, str) and (hasattr(value, "__float__") or hasattr(value, "__index__"))
         case "int" | "SupportsIndex" | "SupportsInt":
             return not isinstance(value, str) and hasattr(value, "__index__")
-        case "PathLike":
-            return isinstance(value, os.PathLike)
-        case "Path":
+        case "PathLike" | "Path":
             return isinstance(value, os.PathLike)
         case "Annotated":
             return fits(value, inside[0])
@@ -118,8 +116,7 @@ def _fits_one(value: Any, text: str) -> bool:
         case "Sequence" | "list" | "tuple" | "Iterable":
             if isinstance(value, str | bytes) or not hasattr(value, "__iter__"):
                 return False
-            of = [one for one in inside if one not in ("...", '"FixedSize(2)"')][:1]
-            return not of or not isinstance(value, Sequence) or all(fits(one, of[0]) for one in value)
+            return not inside or not isinstance(value, Sequence) or all(fits(one, inside[0]) for one in value)
         case "Mapping" | "dict":
             return isinstance(value, Mapping) and all(
                 fits(key, inside[0]) and fits(item, inside[1]) for key, item in value.items() if len(inside) > 1
@@ -143,7 +140,7 @@ _WORDS: Final = {
     "SupportsIndex": "a whole number",
     "SupportsInt": "a whole number",
     "PathLike": "a path",
-    "Path": "a path",
+    "Path": "a pathlib.Path",
     "ArrayLike": "an array of numbers",
     "Callable": "a function",
 }

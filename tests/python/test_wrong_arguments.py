@@ -99,3 +99,12 @@ def test_what_fits_is_taken(value: object, kind: str) -> None:
     assert fits(value, kind)
     assert not fits(Strange(), kind)
     assert expected(kind)
+
+
+def test_a_value_that_no_text_can_show_is_refused_all_the_same() -> None:
+    class Unprintable:
+        def __repr__(self) -> str:
+            return "\udcff"  # half of a surrogate pair
+
+    with pytest.raises((TypeError, UnicodeError)):
+        sd.Plan(Unprintable(), Unprintable(), Unprintable())  # type: ignore[arg-type]

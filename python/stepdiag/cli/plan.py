@@ -142,11 +142,10 @@ def plan(
     from stepdiag.io.whole_files import check_input, write_whole
     from stepdiag.planning.best_plan import best_plans
     from stepdiag.planning.plan_by_time import (
-        Aim,
+        aim_of,
         choose,
         deciding_goal,
         own_candidate,
-        own_spacing,
         squareness_goal,
         telling,
         volume_goal,
@@ -186,9 +185,7 @@ def plan(
         *([squareness_goal(squareness_u)] if squareness_u is not None else []),
         *([deciding_goal(decide, known.between_nodes)] if decide is not None else []),
     ]
-    available = known.keys.plan_by_time.minutes if minutes is None and not goals else minutes
-    near = own_spacing(known) if spacing is None else spacing
-    aim = Aim(family, math.inf if available is None else available, near, tuple(goals))
+    aim = aim_of(known, minutes=minutes, spacing=spacing, family=family, goals=goals)
     with Progress("plans") as progress:
         found = best_plans(described, aim, times=times, progress=progress)
     choice = choose(found, aim)

@@ -1,10 +1,9 @@
 """`plan`: the best plan for the available time."""
 
-import math
 from collections.abc import Callable
 
 from stepdiag.planning.best_plan import best_plans
-from stepdiag.planning.plan_by_time import Aim, Choice, Family, choose, own_spacing, squareness_goal, volume_goal
+from stepdiag.planning.plan_by_time import Choice, Family, aim_of, choose, squareness_goal, volume_goal
 from stepdiag.scenario.description import Scenario
 from stepdiag.units import MICROMETRE, MICRORADIAN
 from stepdiag.wrong_arguments import checked
@@ -38,12 +37,9 @@ def plan(
     Raises:
         InvalidArgument: the scenario names lines that there are not, or an argument is not valid.
     """
-    known = scenario.known
     goals = [
         *([volume_goal(volume_u / MICROMETRE)] if volume_u is not None else []),
         *([squareness_goal(squareness_u / MICRORADIAN)] if squareness_u is not None else []),
     ]
-    available = known.keys.plan_by_time.minutes if minutes is None and not goals else minutes
-    near = own_spacing(known) if spacing is None else spacing
-    aim = Aim(best_at, math.inf if available is None else available, near, tuple(goals))
+    aim = aim_of(scenario.known, minutes=minutes, spacing=spacing, family=best_at, goals=goals)
     return choose(best_plans(scenario, aim, progress=progress), aim)

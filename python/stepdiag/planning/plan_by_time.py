@@ -175,6 +175,16 @@ class Aim:
         return (over, *own, one.seconds)
 
 
+def aim_of(
+    known: Known, *, minutes: float | None, spacing: float | None, family: Family, goals: Sequence[Goal] = ()
+) -> Aim:
+    """The aim in the time that there is: none is [plan_by_time] minutes, or with goals any. No `spacing`: that of the
+    scenario's own plan."""
+    available = known.keys.plan_by_time.minutes if minutes is None and not goals else minutes
+    near = own_spacing(known) if spacing is None else spacing
+    return Aim(family, math.inf if available is None else available, near, tuple(goals))
+
+
 def rounded(value: float) -> float:
     """To six digits: of plans that are mirror images of each other rounding must not choose."""
     return float(f"{value:.6g}")

@@ -378,3 +378,18 @@ def test_plans_with_and_without_returns_are_compared_where_the_functional_point_
     aim = Aim("squareness", 60.0, 20.0)
     assert "returns" in "\n".join(plan_rows(found, choose(found, aim), aim))
     assert "returning to check points after every 2 steps" in "\n".join(advice([returning], aim))
+
+
+def test_plan_is_the_best_of_the_stated_ones_in_the_time_or_the_shortest_for_a_goal() -> None:
+    scenario = parse_scenario(SCENARIO + FEW + SETS)
+    outcomes = [outcome(scenario, candidate) for candidate in stated_candidates(scenario)]
+    within = [one for one in outcomes if one.minutes <= 25.0 and one.spacing <= 16.0 * (1.0 + 1e-9)]
+    taken = sd.plan(scenario, minutes=25.0, spacing=16.0).taken
+    assert taken is not None
+    assert taken.volume == min(one.volume for one in within)
+    goal = sd.plan(scenario, spacing=16.0, volume_u=2.0 * taken.volume)
+    assert goal.reached
+    assert goal.taken is not None
+    reached = [one for one in outcomes if one.volume <= 2.0 * taken.volume and one.spacing <= 16.0 * (1.0 + 1e-9)]
+    assert goal.taken.minutes == min(one.minutes for one in reached)
+    assert sd.plan(scenario, minutes=0.1).taken is None
