@@ -39,14 +39,15 @@ from stepdiag._core import (
     random_error_map,
     read_error_map,
 )
+from stepdiag._core import UnseenFault as _UnseenFault
 from stepdiag._core import word_findings_with as _word_findings_with
 from stepdiag._core import word_reasons_with as _word_reasons_with
 from stepdiag._core import word_unseen_faults_with as _word_unseen_faults_with
 from stepdiag._core import word_wrong_arguments_with as _word_wrong_arguments_with
-from stepdiag.calibration.finding_text import reason_texts as _reason_texts
-from stepdiag.calibration.finding_text import undetermined_text as _undetermined_text
-from stepdiag.calibration.unseen_text import unseen_texts as _unseen_texts
 from stepdiag.figures.methods import attach as _attach_figures
+from stepdiag.findings.reasons import reason_texts as _reason_texts
+from stepdiag.findings.undetermined import undetermined_text as _undetermined_text
+from stepdiag.findings.unseen import unseen_texts as _unseen_texts
 from stepdiag.io.displays import attach as _attach_displays
 from stepdiag.io.methods import attach as _attach_files
 from stepdiag.wrong_arguments import wrong_arguments as _wrong_arguments
@@ -62,10 +63,10 @@ if TYPE_CHECKING:
     from stepdiag.exporting.write import export
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.mistakes.search import find_mistakes
-    from stepdiag.page.document import report
     from stepdiag.parameters import in_report_units, kind_of
     from stepdiag.planning.observation import observe
     from stepdiag.planning.plan import plan
+    from stepdiag.presentation.page.document import report
     from stepdiag.rechecking.recheck import recheck
     from stepdiag.rechecking.verification import verify
     from stepdiag.scenario.description import Scenario, parse_scenario, read_scenario
@@ -148,7 +149,7 @@ _LATER = {
         "read_measurement",
     ),
     "mistakes.search": ("find_mistakes",),
-    "page.document": ("report",),
+    "presentation.page.document": ("report",),
     "parameters": (
         "in_report_units",
         "kind_of",
@@ -167,12 +168,19 @@ _LATER = {
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 _MODULES = ("live", "methods", "montecarlo", "optics", "positions", "results")
 
+
+def _unseen_faults(faults: list[_UnseenFault], calibration: Calibration) -> list[str]:
+    from stepdiag.calibration.largest_by_kind import largest_uncertainties  # numpy, for which an import does not wait
+
+    return _unseen_texts(faults, {kind: u for kind, (u, _) in largest_uncertainties(calibration).items()})
+
+
 _attach_files()
 _attach_displays()
 _attach_figures()
 _word_findings_with(_undetermined_text)  # the extension's findings are worded here
 _word_reasons_with(_reason_texts)
-_word_unseen_faults_with(_unseen_texts)
+_word_unseen_faults_with(_unseen_faults)
 _word_wrong_arguments_with(_wrong_arguments)
 
 

@@ -27,7 +27,7 @@ from stepdiag.calibration.truth import TruthAgreement
 from stepdiag.calibration.volume import PointErrors, VolumeContribution, VolumeErrors, VolumeFigure
 from stepdiag.calibration.volume_change import FigureChange, ParameterEffect, VolumeChange
 from stepdiag.evaluation.judge import Judgement
-from stepdiag.mistakes.search import FoundMistake
+from stepdiag.findings.mistakes import FoundMistake
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.truth import Truth
 

@@ -23,7 +23,8 @@ BELOW: dict[str, set[str]] = {
     "config": {"setup_quantities"},
     "wrong_arguments": set(),
     "option_field": set(),
-    "calibration": {"parameters", "setup_quantities", "style", "display", "wrong_arguments"},
+    "findings": {"parameters", "setup_quantities"},
+    "calibration": {"findings", "style", "display", "wrong_arguments"},
     "io": {"config", "calibration", "interruption", "memory"},
     "positions": {"io"},
     "head": {"io"},
@@ -40,12 +41,10 @@ BELOW: dict[str, set[str]] = {
     "twin": {"acquisition"},
     "linuxcnc": set(),
     "figures": {"planning"},
-    "presentation": {"figures", "acquisition", "positions", "evaluation"},
     "selftest": {"uncertainty"},
-    "objects": {"presentation", "exporting", "selftest"},
-    "page": {"objects"},
-    "demo": {"presentation", "program", "exporting", "linuxcnc", "twin"},
-    "cli": {"demo", "page", "progress", "importing"},
+    "presentation": {"figures", "acquisition", "positions", "evaluation", "exporting", "selftest"},
+    "demo": {"presentation", "program", "linuxcnc", "twin"},
+    "cli": {"demo", "progress", "importing"},
     # What the package shows to specialists.
     "optics": {"head"},
     "methods": {"planning"},
@@ -54,7 +53,7 @@ BELOW: dict[str, set[str]] = {
     "results": {"evaluation"},
     "__main__": {"cli"},
 }
-MOST_OF_A_ROOM = 20  # modules beside __init__, of more than which nobody keeps count
+MOST_OF_A_FOLDER = 20  # modules beside __init__, of more than which nobody keeps count
 
 
 class Import(NamedTuple):
@@ -151,11 +150,14 @@ def test_flags_and_output_are_those_of_the_command_line_alone() -> None:
     assert not offences, "\n".join(offences)
 
 
-@pytest.mark.parametrize("room", [room for room in BELOW if f"stepdiag.{room}" in MODULES])
-def test_room_is_of_a_size_that_one_keeps_in_mind(room: str) -> None:
-    own = [module for module in MODULES if room_of(module) == room and module.count(".") > 1]
-    assert len(own) <= MOST_OF_A_ROOM, own
-    assert not [module for module in own if module.split(".")[-1].startswith(f"{room}_")], "repeats the room's name"
+FOLDERS = sorted({file.parent for file in MODULES.values()} - {PYTHON / "stepdiag"})
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_folder_is_of_a_size_that_one_keeps_in_mind(folder: Path) -> None:
+    own = [file.stem for file in MODULES.values() if file.parent == folder and file.stem != "__init__"]
+    assert len(own) <= MOST_OF_A_FOLDER, own
+    assert not [name for name in own if name.startswith(f"{folder.name}_")], "repeats the room's name"
 
 
 def test_messages_of_the_package_name_no_flags() -> None:

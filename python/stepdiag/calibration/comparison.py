@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
-from stepdiag.calibration.finding_text import UNVERIFIED
 from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
-from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.calibration.truth import TRUTH, TruthAgreement, agreement_with_truth, truth_as_calibration
 from stepdiag.display import Displayed, Facts, lengths_text
+from stepdiag.findings.meaning import UNVERIFIED
+from stepdiag.findings.temperature import temperature_mark
 from stepdiag.parameters import units_of
 from stepdiag.style import drawn
 from stepdiag.units import report_value

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument
-from stepdiag.calibration.finding_text import frame_deviation_texts
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.findings.error_map import frame_deviation_texts
 from stepdiag.parameters import SQUARENESSES
 
 TRUTH: Final = "error map"  # the method of a truth that stands in place of a calibration

@@ -111,7 +111,7 @@ def report(
     volume in three dimensions, residuals, set-up and provenance. With an earlier calibration BEFORE
     it shows before and after. Calibrations in CSV have no residuals; --scenario and --run give them.
     """
-    from stepdiag.calibration.temperature_text import workpiece_rows
+    from stepdiag.findings.temperature import workpiece_rows
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
     from stepdiag.presentation.calibration import calibration_report, functional_point_csv
@@ -139,8 +139,8 @@ def report(
     if path is not None:
         write_whole(path, functional_point_csv(read))
     if as_json:
-        from stepdiag.objects.report import report_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.report import report_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(report_object(read, calibration, trust_warnings(calibration, read))))
     else:
@@ -168,8 +168,8 @@ def _write_page(
     words: Mapping[str, str | None],
 ) -> Calibration | None:
     """Write the page; the calibration before, if there is one."""
-    from stepdiag.page.contents import ReportRequest
-    from stepdiag.page.document import write_report
+    from stepdiag.presentation.page.contents import ReportRequest
+    from stepdiag.presentation.page.document import write_report
     from stepdiag.units import MICROMETRE
 
     before = calibrations[0] if len(calibrations) == 2 else None
@@ -237,8 +237,8 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         write_comparison(comparison, written)
     warnings = [*trust_warnings(a, comparison.a), *trust_warnings(b, comparison.b)]
     if as_json:
-        from stepdiag.objects.comparison import comparison_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.comparison import comparison_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(comparison_object(comparison, change, (a, b), warnings)))
     else:
@@ -276,8 +276,8 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     out. If the rest does not agree, or readings were left out, the command ends with a warning and
     exit code 3.
     """
-    from stepdiag.calibration.finding_text import fault_text
     from stepdiag.config.toml_text import located
+    from stepdiag.findings.faults import fault_text
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
     from stepdiag.presentation.verification import agrees, verification_report
@@ -303,8 +303,8 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
         ]
     warnings += [f"{run}: {fault_text(found)}" for found in verification.left_out]
     if as_json:
-        from stepdiag.objects.verification import verification_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.verification import verification_object
+        from stepdiag.presentation.objects.writer import json_text
 
         files = (calibration, run)
         click.echo(json_text(verification_object(verification, tested, measurement, alpha, files, warnings)))
@@ -357,9 +357,9 @@ def recheck(
     changed, no such change explains the readings (changed, unexplained), or readings were left out,
     the command ends with a warning and exit code 3.
     """
-    from stepdiag.calibration.finding_text import fault_text
     from stepdiag.calibration.volume import volume
     from stepdiag.config.toml_text import located
+    from stepdiag.findings.faults import fault_text
     from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
     from stepdiag.presentation.verification import recheck_report
@@ -394,8 +394,8 @@ def recheck(
         warnings.append(f"{baseline}: the machine has changed since: do not use it as it is")
     warnings += [f"{run}: {fault_text(found)}" for found in judged.recheck.left_out]
     if as_json:
-        from stepdiag.objects.recheck import recheck_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.recheck import recheck_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(recheck_object(judged, measurement, after, (baseline, run, target), warnings)))
     else:

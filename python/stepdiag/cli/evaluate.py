@@ -81,9 +81,9 @@ def evaluate(
     enhanced      distances, tilts and scale lines, to first order
     conventional  the distances of body diagonals
     """
-    from stepdiag.calibration.temperature_text import temperature_warnings
     from stepdiag.config.toml_text import located
     from stepdiag.evaluation.judge import judge
+    from stepdiag.findings.temperature import temperature_warnings
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
     from stepdiag.presentation.evaluation import evaluation_report
@@ -117,8 +117,8 @@ def evaluate(
     )
     of_inputs += temperature_warnings(written, measurement)
     if as_json:
-        from stepdiag.objects.evaluation import evaluated_files, evaluation_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.evaluation import evaluated_files, evaluation_object
+        from stepdiag.presentation.objects.writer import json_text
 
         files, warnings = evaluated_files(scenario, run, path), [*of_inputs, *trust_warnings(path, written)]
         click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings, mistakes)))
@@ -187,8 +187,8 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     with Progress("numbers of steps") as progress:
         table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps], progress)
     if as_json:
-        from stepdiag.objects.observation import observation_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.observation import observation_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(observation_object(found, run, known, tried, table)))
     else:

@@ -126,8 +126,8 @@ def export(
     with Progress("export"):
         done = write_export(read, to, path, ExportOptions(**options))
     if as_json:
-        from stepdiag.objects.export import export_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.export import export_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(export_object(done, read, to, calibration, trust_warnings(calibration, read))))
     for line in done.told:

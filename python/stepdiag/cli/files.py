@@ -31,7 +31,7 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     Exit code 2 if a file is invalid or two do not belong together, 3 if a fit is rejected or a
     calibration is unverified (without a checksum).
     """
-    from stepdiag.calibration.finding_text import UNVERIFIED
+    from stepdiag.findings.meaning import UNVERIFIED
     from stepdiag.presentation.file_check import Finding, examine
     from stepdiag.presentation.scenario_and_run import FoundTogether, adjust_run
 
@@ -66,8 +66,8 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     warnings += [f"{path}: {UNVERIFIED}" for path, r in found if isinstance(r, Finding) and r.unverified]
     warnings = warnings if sound else []
     if as_json:
-        from stepdiag.objects.check import check_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.check import check_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(check_object(found, scenario, runs, warnings)))
     for warning in warnings:
@@ -167,8 +167,8 @@ def selftest(context: click.Context, output: OutputFile | None, as_json: bool) -
     warnings = [] if found.passed else [f"the self-test failed ({', '.join(failed)}): do not use this installation"]
     text = found.text
     if as_json:
-        from stepdiag.objects.selftest import selftest_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.selftest import selftest_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(selftest_object(found, warnings)))
     else:

@@ -203,7 +203,7 @@ def is_untrusted(*calibrations: HasFit) -> bool:
 
 def trust_warnings(path: Path, calibration: HasFit) -> list[str]:
     """What to warn of if the fit of a calibration is not accepted, or if it is unverified."""
-    from stepdiag.calibration.finding_text import UNVERIFIED
+    from stepdiag.findings.meaning import UNVERIFIED
 
     fit = calibration.fit
     meaning = {

@@ -91,8 +91,8 @@ def positions(
             progress(len(predicted), len(lines))
             predicted[name] = predict_positions(calibration, *ends, points=points, tool=tool)
     if as_json:
-        from stepdiag.objects.positions import predicted_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.positions import predicted_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(predicted_object(calibration, predicted, file, trust_warnings(file, calibration))))
     else:
@@ -113,8 +113,8 @@ def _evaluate(file: Path, as_json: bool) -> None:
         raise InvalidArgument(f"{file}: {error}") from None
     warnings = [f"{file}: {warning}" for warning in measured_warnings(result)]
     if as_json:
-        from stepdiag.objects.positions import measured_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.positions import measured_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(measured_object(result, file, warnings)))
     else:

@@ -97,8 +97,8 @@ def volume(
             progress=progress,
         )
     if as_json:
-        from stepdiag.objects.volume import volume_object
-        from stepdiag.objects.writer import json_text
+        from stepdiag.presentation.objects.volume import volume_object
+        from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(volume_object(found, calibration, trust_warnings(calibration, read))))
     else:

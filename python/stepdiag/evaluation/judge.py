@@ -12,9 +12,9 @@ from stepdiag._core import (
     Outlier,
     VarianceComponent,
 )
-from stepdiag.calibration.finding_text import mistake_reason
-from stepdiag.mistakes.search import FoundMistake, MistakeSearch
-from stepdiag.mistakes.text import change_rows, mistake_text
+from stepdiag.findings.mistakes import FoundMistake, change_rows, mistake_text
+from stepdiag.findings.reasons import mistake_reason
+from stepdiag.mistakes.search import MistakeSearch
 from stepdiag.scenario.description import (
     JudgedEvaluation,
     Scenario,

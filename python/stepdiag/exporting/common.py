@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
-from stepdiag.calibration.temperature_text import temperature_rows
+from stepdiag.findings.temperature import temperature_rows
 from stepdiag.parameters import AXES
 
 FloatArray = npt.NDArray[np.float64]

@@ -13,8 +13,6 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import trust_rows, unverified_key
-from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.exporting.common import (
     ExportOptions,
     FloatArray,
@@ -30,6 +28,8 @@ from stepdiag.exporting.common import (
     words,
 )
 from stepdiag.exporting.result import Export, coverage_of
+from stepdiag.findings.meaning import trust_rows, unverified_key
+from stepdiag.findings.temperature import temperature_text
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 

@@ -21,7 +21,6 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import provenance_rows, trust_rows
 from stepdiag.exporting.common import (
     APPROACH_WORDS,
     ExportOptions,
@@ -39,6 +38,7 @@ from stepdiag.exporting.common import (
 )
 from stepdiag.exporting.fewest_nodes import best_subset
 from stepdiag.exporting.result import Export, coverage_of
+from stepdiag.findings.meaning import provenance_rows, trust_rows
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 UNTRIED: Final = "written from the manual (ISG FCT-C26, Beckhoff TF5280), not tried on a controller"

@@ -20,7 +20,6 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import provenance_rows, trust_rows
 from stepdiag.exporting.common import (
     ExportOptions,
     FloatArray,
@@ -37,6 +36,7 @@ from stepdiag.exporting.common import (
 from stepdiag.exporting.fewest_nodes import best_subset
 from stepdiag.exporting.left_in_volume import left_in_volume, what_is_left
 from stepdiag.exporting.result import Export, coverage_of
+from stepdiag.findings.meaning import provenance_rows, trust_rows
 from stepdiag.io.comp_set import fingerprint_rows
 from stepdiag.parameters import AXES
 

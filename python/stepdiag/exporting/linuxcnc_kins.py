@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Calibration, Compensator
-from stepdiag.calibration.finding_text import trust_rows
 from stepdiag.exporting.common import (
     ExportOptions,
     FloatArray,
@@ -21,6 +20,7 @@ from stepdiag.exporting.common import (
     words,
 )
 from stepdiag.exporting.result import Export, coverage_of
+from stepdiag.findings.meaning import trust_rows
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 
 

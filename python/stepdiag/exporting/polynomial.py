@@ -22,7 +22,6 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, ErrorMap, Machine
-from stepdiag.calibration.finding_text import provenance_rows
 from stepdiag.exporting.common import (
     ExportOptions,
     FloatArray,
@@ -34,6 +33,7 @@ from stepdiag.exporting.common import (
 )
 from stepdiag.exporting.left_in_volume import LeftInVolume, Motors, left_in_volume, volume_grid_of, what_is_left
 from stepdiag.exporting.result import Export, coverage_of, csv_leading, heading
+from stepdiag.findings.meaning import provenance_rows
 from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 

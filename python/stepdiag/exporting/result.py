@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import trust_rows, unverified_key
 from stepdiag.exporting.common import (
     APPROACH_WORDS,
     ExportOptions,
@@ -18,6 +17,7 @@ from stepdiag.exporting.common import (
     words,
 )
 from stepdiag.exporting.left_in_volume import LeftInVolume
+from stepdiag.findings.meaning import trust_rows, unverified_key
 from stepdiag.io.csv_text import lengths
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 

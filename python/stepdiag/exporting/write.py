@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
-from stepdiag.calibration.finding_text import MEANING, check_angles
 from stepdiag.exporting.common import ExportOptions, tool_of
 from stepdiag.exporting.csv_grid import csv_grid
 from stepdiag.exporting.isg import isg
@@ -23,6 +22,8 @@ from stepdiag.exporting.linuxcnc_kins import linuxcnc_kins
 from stepdiag.exporting.polynomial import calibxyzkins, matrix, squareness
 from stepdiag.exporting.position_error import position_error
 from stepdiag.exporting.result import Export
+from stepdiag.findings.error_map import check_angles
+from stepdiag.findings.meaning import MEANING
 from stepdiag.io.data_files import is_netcdf, read_calibration
 from stepdiag.io.whole_files import check_output, make_folder, write_set
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES

@@ -10,8 +10,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stepdiag._core import Calibration, ErrorMap
-from stepdiag.calibration.finding_text import FITS, MEANING
-from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.figures.page import Heading, Page
 from stepdiag.figures.parameter_panels import (
     COVERAGE_FACTOR,
@@ -22,6 +20,8 @@ from stepdiag.figures.parameter_panels import (
     ParameterPanels,
     largest,
 )
+from stepdiag.findings.meaning import FITS, MEANING
+from stepdiag.findings.temperature import temperature_mark
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.style import BAND, COLOUR, own_style
 

@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
-from stepdiag.calibration.finding_text import fault_rows, reason_texts
 from stepdiag.figures.page import SMALL, Heading, Page
+from stepdiag.findings.faults import fault_rows
+from stepdiag.findings.reasons import reason_texts
 from stepdiag.style import BAND, COLOUR, axis_label, own_style, plain
 from stepdiag.units import MICRO
 

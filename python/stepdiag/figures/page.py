@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Rectangle
 
-from stepdiag.calibration.finding_text import UNVERIFIED
+from stepdiag.findings.meaning import UNVERIFIED
 from stepdiag.style import COLOUR, own_style, plain, save
 
 LEFT, RIGHT = 0.72, 0.25

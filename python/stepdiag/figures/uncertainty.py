@@ -12,13 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
-from stepdiag.calibration.finding_text import combination_text
-from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.display import lines_text
 from stepdiag.figures.calibration import undetermined_notes, with_gaps
 from stepdiag.figures.growth import OWN, draw_growth_panels
 from stepdiag.figures.page import SMALL, Heading, Page
 from stepdiag.figures.parameter_panels import HATCH, HEIGHT, WIDTH, ParameterPanels, scaled
+from stepdiag.findings.temperature import reference_mark
+from stepdiag.findings.undetermined import combination_text
 from stepdiag.io.csv_text import CsvTable, finite_number, read_csv
 from stepdiag.io.data_files import is_netcdf
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, kind_of, units_of

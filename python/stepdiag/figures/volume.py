@@ -7,9 +7,9 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from stepdiag._core import Calibration, InvalidArgument, Machine, errors_at
-from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.figures.page import Heading, Page
+from stepdiag.findings.temperature import temperature_mark
 from stepdiag.parameters import AXES
 from stepdiag.style import COLOUR, axis_label, own_style
 

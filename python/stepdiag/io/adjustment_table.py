@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Adjustment, FaultClass, Measurement, Outlier, SetupEstimate
-from stepdiag.calibration.finding_text import combination_text
+from stepdiag.findings.undetermined import combination_text
 from stepdiag.io.labelled_tables import calibration_table, channel_units
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 

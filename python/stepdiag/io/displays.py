@@ -116,7 +116,7 @@ def _adjustment(adjustment: Adjustment) -> Facts:
 
 
 def _verdict(verdict: Verdict) -> Facts:
-    from stepdiag.calibration.finding_text import reason_texts
+    from stepdiag.findings.reasons import reason_texts
 
     return [("fit", verdict.fit), *(("because", text) for text in reason_texts(verdict.reasons))]
 

@@ -8,8 +8,8 @@ import pandas as pd
 import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
-from stepdiag.calibration.finding_text import unverified_key
 from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.findings.meaning import unverified_key
 from stepdiag.parameters import COMPONENT_MEANING, units_of
 
 _SQUARENESS = {"C0Y": "squareness of Y to X", "B0Z": "squareness of Z to X", "A0Z": "squareness of Z to Y"}

@@ -20,6 +20,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument, check_points
+from stepdiag.findings.mistakes import FoundMistake
 from stepdiag.mistakes.catalogue import CATALOGUE
 from stepdiag.mistakes.copies import Change, Copy, Family, Hypothesis, Rows, in_turn, of_rows, passes_of, without
 from stepdiag.mistakes.nominal_way import Way, distance_of, ways_of
@@ -49,29 +50,6 @@ MOST_PARABOLAS: Final = 6
 SAMPLE: Final = 2500  # readings of the runs by which mistakes are screened: the time of a search is then limited
 MOST_DISTURBED: Final = 40  # passes of which one is tried as the disturbed one
 NEAR: Final = 10.0  # times the least square sum of a screening, above which nothing becomes the best
-
-
-@dataclass(frozen=True)
-class FoundMistake:
-    """A mistake that would explain a run.
-
-    entry: its name in the catalogue; of two at once both.
-    text, edit: what happened, and what to change; without a full stop.
-    fit, variance_factor: verdict of the adjustment with the mistake undone.
-    variance_factor_before: with it; None where the readings could not be adjusted.
-    alternatives: of the first of a list: how many more there are that the readings do not tell from it, and that are
-    not in the list.
-    or_faults: the faults of readings that the adjustment found explain as much, and are as likely: they are few, on few
-    lines, and the mistake has a number that was chosen for the fit, as they have."""
-
-    entry: str
-    text: str
-    edit: str
-    fit: str
-    variance_factor: float
-    variance_factor_before: float | None
-    alternatives: int = 0
-    or_faults: bool = False
 
 
 @dataclass(frozen=True)

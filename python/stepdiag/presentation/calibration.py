@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import fit_rows, provenance_rows, unverified_key
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.calibration.largest_by_kind import LargestEntry, largest_entries
-from stepdiag.calibration.temperature_text import temperature_rows
-from stepdiag.calibration.unseen_text import unseen_rows
+from stepdiag.findings.meaning import fit_rows, provenance_rows, unverified_key
+from stepdiag.findings.temperature import temperature_rows
+from stepdiag.findings.unseen import unseen_rows
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import REPORT_UNIT, Kind, in_report_units
 from stepdiag.presentation.comparison import decimal

@@ -9,9 +9,9 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.comparison import Comparison, Difference, made_of
-from stepdiag.calibration.finding_text import unverified_key
 from stepdiag.calibration.truth import TruthAgreement
 from stepdiag.calibration.volume_change import VolumeChange
+from stepdiag.findings.meaning import unverified_key
 from stepdiag.io.comparison_read import COMPARISON_FORMAT
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf

@@ -14,14 +14,16 @@ from stepdiag._core import (
     Measurement,
     straightness_reference,
 )
-from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fault_rows, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
-from stepdiag.calibration.temperature_text import temperature_rows
-from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.display import point_text
+from stepdiag.findings.faults import fault_rows
+from stepdiag.findings.meaning import NOISE_ALONE, fit_rows
+from stepdiag.findings.mistakes import FoundMistake, change_rows
+from stepdiag.findings.temperature import temperature_rows
+from stepdiag.findings.undetermined import combination_text
+from stepdiag.findings.unseen import unseen_rows
+from stepdiag.findings.verdict import verdict_rows
 from stepdiag.mistakes.copies import passes_of
-from stepdiag.mistakes.search import FoundMistake
-from stepdiag.mistakes.text import change_rows
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.presentation.fault_control import control_rows
 from stepdiag.presentation.prior_effects import cosine_rows, drift_rows, rounding_rows

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 from stepdiag._core import FaultControl
-from stepdiag.calibration.unseen_text import FAULT_NAMES, FAULT_UNITS
+from stepdiag.findings.unseen import FAULT_NAMES, FAULT_UNITS
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
 from stepdiag.units import report_value
 

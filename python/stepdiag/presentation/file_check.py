@@ -9,8 +9,9 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument
-from stepdiag.calibration.finding_text import UNVERIFIED, check_angles, frame_deviation_texts, implausible_texts
 from stepdiag.display import lines_text
+from stepdiag.findings.error_map import check_angles, frame_deviation_texts, implausible_texts
+from stepdiag.findings.meaning import UNVERIFIED
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
 from stepdiag.io.refused_files import import_hint

@@ -5,9 +5,9 @@ from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import Adjustment
-from stepdiag.calibration.finding_text import combination_text
-from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.display import lines_text
+from stepdiag.findings.temperature import reference_mark
+from stepdiag.findings.undetermined import combination_text
 from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
 from stepdiag.planning.observation import Prospect, extents, growth

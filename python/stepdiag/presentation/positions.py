@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import fit_rows
+from stepdiag.findings.meaning import fit_rows
 from stepdiag.positions.evaluation import CYCLES_OF_THE_STANDARD, MeasuredPositions
 from stepdiag.positions.figures import FIGURES, PositionFigure, symbol
 from stepdiag.positions.prediction import PredictedPositions

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement, check_points
-from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.evaluation.judge import judge
+from stepdiag.findings.mistakes import FoundMistake, change_rows, mistake_text
+from stepdiag.findings.verdict import verdict_rows
 from stepdiag.io.data_files import read_measurement
-from stepdiag.mistakes.search import FoundMistake
-from stepdiag.mistakes.text import change_rows, mistake_text
 from stepdiag.scenario.description import read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.display import lines_text
+from stepdiag.findings.temperature import reference_mark
 from stepdiag.presentation.text_columns import text_columns
 from stepdiag.scenario.uncertain_inputs import key_unit
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stepdiag._core import ChangeCombination, ChangeTerm, FaultClass, Measurement, Recheck, Verification
-from stepdiag.calibration.finding_text import fault_rows
 from stepdiag.calibration.volume import VolumeErrors
+from stepdiag.findings.faults import fault_rows
 from stepdiag.presentation.text_columns import text_columns
 from stepdiag.rechecking.recheck import CHANGE_UNITS, Judged
 from stepdiag.units import MICROMETRE, MICRORADIAN

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Machine
-from stepdiag.calibration.finding_text import headline, is_valid
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.volume import MOST_NODES, Interval, VolumeContribution, VolumeErrors, VolumeFigure
+from stepdiag.findings.meaning import headline, is_valid
+from stepdiag.findings.temperature import temperature_rows
 from stepdiag.units import report_value
 
 _RANKED: Final = 5  # parameters in the report; the JSON object has all

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import NOISE_ALONE
 from stepdiag.calibration.volume import chord_variance
+from stepdiag.findings.meaning import NOISE_ALONE
 from stepdiag.parameters import kind_of
 from stepdiag.scenario.known import Known
 from stepdiag.units import MICROMETRE

@@ -14,12 +14,13 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.calibration.finding_text import FITS, MEANING, mistake_reason
 from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.display import Displayed, Facts
+from stepdiag.findings.meaning import FITS, MEANING
+from stepdiag.findings.reasons import mistake_reason
 from stepdiag.io.refused_files import explained
 from stepdiag.io.whole_files import read_text
 from stepdiag.memory import check_memory, for_evaluation

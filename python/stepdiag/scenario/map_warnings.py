@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from stepdiag._core import Chain, ErrorMap, InvalidArgument
-from stepdiag.calibration.finding_text import UNVERIFIED, frame_deviation_texts, implausible_texts
+from stepdiag.findings.error_map import frame_deviation_texts, implausible_texts
+from stepdiag.findings.meaning import UNVERIFIED
 from stepdiag.scenario.description import Scenario, implausible_truth
 from stepdiag.scenario.known import Known
 

@@ -7,11 +7,11 @@ from types import MappingProxyType
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.calibration.finding_text import check_angles
 from stepdiag.config.key_errors import show
 from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.display import Displayed, Facts
+from stepdiag.findings.error_map import check_angles
 from stepdiag.io.whole_files import check_input
 from stepdiag.scenario.heads import PoseErrors
 from stepdiag.scenario.known import Known

@@ -9,7 +9,7 @@ import pytest
 from usual import CHAIN, DIAGONALS, SCALE_LINES, VOLUME
 
 import stepdiag as sd
-from stepdiag.calibration.finding_text import verdict_rows
+from stepdiag.findings.verdict import verdict_rows
 
 STATED = {"distance": 0.1e-3, "alpha": 1e-6, "beta": 1e-6}
 MACHINE = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=7))

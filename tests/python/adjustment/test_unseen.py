@@ -7,8 +7,8 @@ import pytest
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.cli import main
+from stepdiag.findings.unseen import unseen_rows
 from stepdiag.parameters import KINDS, kind_of
 
 SOUND = SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3")

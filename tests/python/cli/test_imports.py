@@ -31,6 +31,6 @@ def test_evaluating_to_csv_imports_no_netcdf_and_no_search_that_is_not_made(tmp_
     sd.simulate(sd.read_scenario(scenario)).write(run)
     modules = (
         "netCDF4 xarray pandas matplotlib numpy.ma concurrent.futures tqdm "
-        "stepdiag.head.description stepdiag.objects.evaluation stepdiag.cli.acquire"
+        "stepdiag.head.description stepdiag.presentation.objects.evaluation stepdiag.cli.acquire"
     )
     assert imported_of(modules, "evaluate", scenario, run, "-o", tmp_path / "calibration.csv") == ""

@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 from stepdiag.cli import main
-from stepdiag.objects.schemas import schema_text
+from stepdiag.presentation.objects.schemas import schema_text
 
 
 def checked(name: str, text: str) -> Any:

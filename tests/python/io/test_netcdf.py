@@ -14,7 +14,7 @@ from calibrations import PLAN, TOOL, VOLUME, calibrate, full_run, same_calibrati
 from usual import CHAIN, DIAGONALS
 
 import stepdiag as sd
-from stepdiag.calibration.finding_text import combination_text
+from stepdiag.findings.undetermined import combination_text
 from stepdiag.io.data_files import write_calibration
 
 

@@ -9,9 +9,9 @@ from mistaken import changed, moved, rows_of
 from places import DOCS, EXAMPLES
 
 import stepdiag as sd
-from stepdiag.calibration.finding_text import mistake_reason
+from stepdiag.findings.mistakes import change_rows, mistake_text
+from stepdiag.findings.reasons import mistake_reason
 from stepdiag.mistakes.catalogue import CATALOGUE
-from stepdiag.mistakes.text import change_rows, mistake_text
 
 PAGE = (DOCS / "mistakes.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```\n(.*?)```", PAGE, re.DOTALL)

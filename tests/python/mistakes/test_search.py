@@ -8,8 +8,8 @@ from mistaken import NOISE, changed, described, rows_of, simulated, step_plan
 
 import stepdiag as sd
 from stepdiag._core import fit_quality
+from stepdiag.findings.mistakes import mistake_text
 from stepdiag.mistakes.search import MistakeSearch
-from stepdiag.mistakes.text import mistake_text
 from stepdiag.scenario.description import adjustment_options
 
 HEADS = ["ideal", "psd", "multi_beam"]

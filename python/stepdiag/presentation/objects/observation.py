@@ -1,0 +1,168 @@
+"""The object of `stepdiag observe --json`."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Literal
+
+from typing_extensions import TypedDict
+
+from stepdiag._core import Adjustment, Measurement, __version__
+from stepdiag.parameters import KINDS
+from stepdiag.planning.fault_control import Extension
+from stepdiag.planning.observation import Prospect, extents, growth
+from stepdiag.presentation.objects.calibration import (
+    LeastKnownAngle,
+    LeastKnownLength,
+    OpenFinding,
+    findings_of,
+    largest_of,
+)
+from stepdiag.presentation.objects.evaluation import (
+    AngleControl,
+    ByKind,
+    LengthControl,
+    Readings,
+    SetupAngle,
+    SetupCombination,
+    SetupLength,
+    SetupOffset,
+    SetupRate,
+    SetupShare,
+    SlopeCombination,
+    by_kind,
+    combinations_of,
+    readings_of,
+    reliability_of,
+    setup_of,
+)
+from stepdiag.presentation.prior_effects import cosine_rows, drift_rows
+from stepdiag.scenario.known import Known
+
+
+class ObservedPlan(TypedDict):
+    volume_mm: list[float]
+    lines: list[str]
+    scale_lines: list[str]
+    scale_points: str
+    """Where scale lines are read: at their two "ends", or after all "steps"."""
+    steps: int
+    block: int
+    """So many steps of an axis follow each other."""
+    signals: list[str]
+
+
+class ExtendedPlan(TypedDict):
+    name: str
+    """What is added to the plan."""
+    longer_minutes: float
+    """How much longer it takes."""
+    trouble: str | None
+    """Why there is no result."""
+    reliability: list[LengthControl | AngleControl]
+
+
+class StepsObject(TypedDict):
+    """What a number of steps would give."""
+
+    steps: int
+    mirror_mm: list[float]
+    """Width and height of the smallest mirror."""
+    trouble: str | None
+    """Why there is no result."""
+    largest_standard_uncertainty: ByKind
+
+
+class GrowthExponents(TypedDict):
+    """e of u ~ steps^e."""
+
+    positioning: float | None
+    straightness: float | None
+    angle: float | None
+    squareness: float | None
+
+
+class ObservationObject(TypedDict):
+    """Result of `stepdiag observe`: of a run without errors, so there is no verdict."""
+
+    stepdiag: str
+    format: Literal["stepdiag observation 1"]
+    warnings: list[str]
+    scenario: str
+    plan: ObservedPlan
+    readings: Readings
+    degrees_of_freedom: int
+    determined: list[str]
+    """Parameters that are determined as a whole."""
+    determined_but_for_slope: list[str]
+    determined_in_part: list[str]
+    """At some of the positions."""
+    undetermined: list[str]
+    """A sentence each."""
+    findings: list[OpenFinding]
+    """The same as data."""
+    combinations: list[SlopeCombination | SetupCombination]
+    """What is known of unknowns that are not determined one by one. All values are 0."""
+    largest_standard_uncertainties: list[LeastKnownLength | LeastKnownAngle]
+    setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
+    """Values are 0."""
+    reliability: list[LengthControl | AngleControl]
+    """Which faults of the readings would be found and distinguished."""
+    extensions: list[ExtendedPlan]
+    """Plans with more in them; empty if the plan distinguishes all faults."""
+    by_steps: list[StepsObject]
+    exponents: GrowthExponents
+    notes: list[str]
+
+
+def observation_object(
+    found: Adjustment, run: Measurement, known: Known, tried: Iterable[Extension], table: Sequence[Prospect]
+) -> ObservationObject:
+    """What a plan determines, which faults it controls, and what other numbers of steps would give."""
+    plan, calibration = known.plan, found.calibration
+    whole, shapes, parts = extents(calibration, plan)
+    exponents: Any = {kind: growth(table, kind) for kind in KINDS}
+    return {
+        "stepdiag": __version__,
+        "format": "stepdiag observation 1",
+        "warnings": [],
+        "scenario": str(known.path),
+        "plan": {
+            "volume_mm": plan.volume.tolist(),
+            "lines": list(plan.lines),
+            "scale_lines": list(plan.scale_lines),
+            "scale_points": plan.scale_points,
+            "steps": plan.steps,
+            "block": plan.block,
+            "signals": list(known.signals),
+        },
+        "readings": readings_of(run, known),
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "determined": whole,
+        "determined_but_for_slope": shapes,
+        "determined_in_part": parts,
+        "undetermined": list(calibration.undetermined),
+        "findings": findings_of(calibration.findings, calibration.undetermined),
+        "combinations": combinations_of(found.combinations, value=False),
+        "largest_standard_uncertainties": largest_of(calibration, uncertainty=True),
+        "setup": setup_of(found.setup),
+        "reliability": reliability_of(found.reliability),
+        "extensions": [
+            {
+                "name": extension.name,
+                "longer_minutes": extension.minutes,
+                "trouble": extension.trouble or None,
+                "reliability": reliability_of(extension.controls),
+            }
+            for extension in tried
+        ],
+        "by_steps": [
+            {
+                "steps": prospect.steps,
+                "mirror_mm": list(prospect.mirror),
+                "trouble": prospect.trouble or None,
+                "largest_standard_uncertainty": by_kind(prospect.largest),
+            }
+            for prospect in table
+        ],
+        "exponents": exponents,
+        "notes": [*cosine_rows(run, known), *drift_rows(run, known)],
+    }

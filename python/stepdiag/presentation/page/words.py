@@ -1,0 +1,465 @@
+"""The parts of a report that are words: verdict, summary, what is open, method, provenance, commands."""
+
+import math
+import shlex
+from collections.abc import Collection, Iterator
+from typing import Any, Final
+
+import numpy as np
+
+from stepdiag._core import Calibration
+from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
+from stepdiag.calibration.volume import VolumeErrors
+from stepdiag.calibration.volume_change import VolumeChange
+from stepdiag.findings.meaning import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, UNVERIFIED, headline, is_valid
+from stepdiag.findings.mistakes import mistake_text
+from stepdiag.findings.reasons import mistake_reason
+from stepdiag.findings.temperature import temperature_text
+from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
+from stepdiag.presentation.page.contents import Contents
+from stepdiag.presentation.page.header import TITLES
+from stepdiag.presentation.page.html import Markup, definitions, element, listed, markup, section, table
+from stepdiag.presentation.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
+from stepdiag.presentation.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
+from stepdiag.units import MICROMETRE
+
+_IS_VALID: Final = {
+    "accepted": "Yes. The readings agree with each other and with the described set-up. This does not tell how "
+    "accurate the machine is.",
+    "doubtful": "Doubtful. The values are the best fit, but the stated uncertainties are not to be relied on.",
+    "rejected": "No. The readings contradict each other. Do not correct the machine with these values.",
+    "unchecked": "Unchecked. The readings do not test this calibration; the reason is above.",
+    None: "Not known. The file does not say how well the readings agree.",
+}
+# What an answer about the machine rests on, where its calibration is not accepted.
+_RESTS_ON: Final = {
+    "doubtful": "The calibration is doubtful: do not rely on this answer.",
+    "rejected": "The calibration is rejected: do not use this answer.",
+    "unchecked": "The calibration is unchecked: nothing controls the readings behind this answer.",
+    None: "Whether the calibration is valid is not known.",
+}
+EARLIER: Final = "The earlier calibration is"
+LEAST_PROBABILITY: Final = 1e-12  # that is told
+MOST_EFFECTS: Final = 6
+MOST_REASONS: Final = 6  # that are shown at once
+SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "unchecked": "?", None: "?"}
+
+
+def header_block(contents: Contents) -> Markup:
+    """Title, logo, and who, which machine, with what."""
+    calibration, words = contents.calibration, contents.header.words
+    pairs: list[tuple[str, object]] = [(title, words[key]) for key, title in TITLES.items() if key in words]
+    pairs += [
+        ("Calibrated volume", f"{' × '.join(position(edge) for edge in calibration.volume)} mm"),
+        ("Kinematic chain", calibration.chain.name),
+        ("Evaluated", moment(calibration.date) or "date not known"),
+        ("Report made", moment(contents.date)),
+    ]
+    logo = element("img", src=contents.header.logo, alt="Logo", class_="logo") if contents.header.logo else None
+    number = f"no. {words['serial_number']}" if "serial_number" in words else ""
+    return element(
+        "header",
+        element(
+            "div",
+            element("p", "Calibration report", class_="kind"),
+            element("h1", ", ".join(filter(None, (words.get("machine"), number))) or "Three-axis machine tool"),
+            element("p", "Geometric errors by the laser step-diagonal method", class_="subject"),
+        ),
+        logo,
+        definitions(pairs, "facts"),
+        id="top",
+    )
+
+
+def verdict_block(contents: Contents) -> Markup:
+    """The verdict of the fit with its reasons and the mistake that would explain it, before anything else."""
+    calibration = contents.calibration
+    fit = calibration.fit
+    is_open = calibration.unverified and fit == "accepted"  # it was valid, and may have been changed since
+    parts: list[Any] = [
+        element(
+            "h2",
+            element("span", SYMBOL[None if is_open else fit], class_="symbol", aria_hidden="true"),
+            f" {headline(calibration)}",
+            id="verdict-heading",
+        )
+    ]
+    meaning = "The file does not say how well the readings agree." if fit is None else f"Fit {fit}: {MEANING[fit]}."
+    factor = calibration.variance_factor
+    if factor is not None:
+        meaning += f" Variance factor {factor:.3g}; 1 is expected."
+    parts.append(element("p", meaning))
+    if calibration.fit_reasons:
+        parts.append(element("p", element("strong", f"{fit or 'not known'} because:".capitalize())))
+        first, others = calibration.fit_reasons[:MOST_REASONS], calibration.fit_reasons[MOST_REASONS:]
+        parts.append(listed(first))
+        if others:
+            parts.append(element("details", element("summary", f"{len(others)} more reasons"), listed(others)))
+    if contents.mistakes:
+        reason = mistake_reason(mistake_text(contents.mistakes))
+        if reason not in calibration.fit_reasons:  # of a file that an older version wrote
+            parts.append(element("p", _sentence(reason)))
+        edits = [mistake.edit for mistake in contents.mistakes]
+        parts.append(element("p", element("strong", "To change:" if len(edits) == 1 else "To change if so:")))
+        parts.append(listed(map(_sentence, edits)))
+    if calibration.unverified:
+        parts.append(element("p", element("strong", _sentence(UNVERIFIED))))
+    notes = []
+    if calibration.uncertainty_scaled is not None:
+        notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
+    if calibration.method in NOISE_ALONE:
+        notes.append(_sentence(NOISE_ALONE[calibration.method]))
+    notes.append(_sentence(temperature_text(calibration)))
+    if fit == "accepted":
+        notes.append(_sentence(NOT_SEEN))
+    notes.append("All this is about the readings. How accurate the machine is stands in the summary.")
+    parts += [element("p", note, class_="note") for note in notes]
+    return element(
+        "section",
+        *parts,
+        id="verdict",
+        class_=f"verdict {'unknown' if fit is None or is_open else fit}",
+        aria_labelledby="verdict-heading",
+    )
+
+
+def _sentence(note: str) -> str:
+    text = note.removeprefix("note: ")
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
+    """A few lines that a customer understands."""
+    calibration = contents.calibration
+    machine = [
+        _within(found.figures),
+        ("Error in the volume", _volume(contents, found.figures)),
+        ("Largest errors", _sentence("; ".join(_largest(calibration)))),
+    ]
+    lines: list[tuple[str, object]] = [
+        ("Is this calibration valid?", _is_valid(calibration)),
+        ("How well known", _how_well(calibration)),
+        *([("Uncertainty budget", _sentence(calibration.budget))] if calibration.budget else []),
+        *([("Conditions used", listed(map(_sentence, calibration.conditions)))] if calibration.conditions else []),
+        ("Not determined", _open(calibration)),
+    ]
+    warning = {
+        "rejected": "This calibration is rejected: the figures below are not to be used.",
+        "doubtful": "This calibration is doubtful: the intervals below are not to be relied on.",
+    }.get(calibration.fit or "")
+    return section(
+        "summary",
+        "Summary",
+        element("p", element("strong", warning)) if warning else None,
+        element("h3", "The machine"),
+        definitions(machine, "lines"),
+        element("h3", "The calibration"),
+        definitions(lines, "lines"),
+    )
+
+
+def _is_valid(calibration: Calibration) -> Markup:
+    """Whether the readings agree, which is no answer about the machine."""
+    answer, rest = _IS_VALID[calibration.fit].split(". ", 1)
+    if calibration.unverified:
+        answer = "Not known" if calibration.fit == "accepted" else answer
+        rest += f" {_sentence(UNVERIFIED)}"
+    return markup(element("strong", f"{answer}."), f" {rest}")
+
+
+def _volume(contents: Contents, figures: VolumeErrors) -> Markup:
+    if math.isnan(figures.largest):
+        return markup(f"The largest error is {why_not_known(figures)}.")
+    parts: list[object] = [
+        "The largest distance of the tool from its commanded position is ",
+        element("strong", with_ends(figures.largest, figures.largest_interval)),
+        f", at {place_of_largest(figures)}; ",
+        f"{with_ends(figures.rms, figures.rms_interval)} rms over the volume.",
+    ]
+    if contents.change is not None and not math.isnan(contents.change.largest.a):
+        parts.append(f" Before: {with_ends(contents.change.largest.a, contents.change.largest.a_interval)}.")
+    return markup(*parts)
+
+
+def _within(figures: VolumeErrors) -> tuple[str, object]:
+    """The machine against the limit that was given, and what the answer rests on."""
+    if figures.limit is None:
+        return "Is the machine within its limit?", "Not asked: the report was made without a limit."
+    if figures.verdict is None or figures.bounds is None:
+        verdict, why = "Not known", _sentence(figures.no_verdict_because)
+    else:
+        above, below = (f"{bound / MICROMETRE:.4g}{NBSP}µm" for bound in figures.bounds)
+        verdict, why = {
+            "within": ("Yes", f"The largest error is below {below} (95 %)."),
+            "not within": ("No", f"The largest error is above {above} (95 %)."),
+            "undecided": (
+                "Cannot be decided",
+                f"The largest error is above {above} and below {below} (95 % each).",
+            ),
+        }[figures.verdict]
+    if figures.interval_note:
+        why += f" {_sentence(figures.interval_note)}"
+    if figures.verdict is not None and figures.fit != "accepted":
+        why += f" {_RESTS_ON[figures.fit]}"
+        verdict += f" ({figures.fit or 'validity not known'})"
+    return (
+        f"Is the machine within {figures.limit / MICROMETRE:.4g}{NBSP}µm?",
+        markup(element("strong", f"{verdict}."), f" {why}"),
+    )
+
+
+def _largest(calibration: Calibration) -> Iterator[str]:
+    for kind, entry in largest_entries(calibration).items():
+        figure, wide = (in_report_units(kind, number) for number in (entry.value, entry.standard_uncertainty))
+        yield f"{kind} {with_interval(figure, wide, REPORT_UNIT[kind])} ({entry.place})"
+
+
+def _how_well(calibration: Calibration) -> str:
+    uncertain = [
+        f"{kind} {shown(in_report_units(kind, COVERAGE_FACTOR * u))}{NBSP}{REPORT_UNIT[kind]}"
+        for kind, (u, _) in largest_uncertainties(calibration).items()
+    ]
+    if not uncertain:
+        return "The file has no uncertainties."
+    said = f"Every value to within (95 %): {', '.join(uncertain)}, or better."
+    if calibration.fit in ("rejected", "doubtful"):
+        said += " The fit is " + calibration.fit + ": these figures are not to be relied on."
+    return said
+
+
+def _open(calibration: Calibration) -> str:
+    count = len(calibration.functions) + len(calibration.squareness)
+    if not calibration.undetermined:
+        return (
+            f"Nothing: all {count} parameters are determined."
+            if count == 21
+            else f"{21 - count} of 21 parameters have no values."
+        )
+    open_ = [f"the slope of {name}" for name in calibration.undetermined_slopes] + _missing(calibration)
+    parts = [
+        f"{', '.join(open_)}." if open_ else f"All {count} parameters are determined, parts of the set-up are not."
+    ]
+    return " ".join([*(part[0].upper() + part[1:] for part in parts), "See “What was not determined”."])
+
+
+def open_section(calibration: Calibration) -> Markup:
+    """What was not determined, and why."""
+    title = "What was not determined"
+    missing = _missing(calibration)
+    parts: list[Any] = []
+    if not calibration.undetermined and not missing:
+        parts.append(element("p", "Nothing: the readings determine all 21 parameters."))
+    if calibration.undetermined:
+        parts.append(listed([f"{text[0].upper()}{text[1:]}." for text in calibration.undetermined]))
+    if missing:
+        parts.append(element("p", f"Without values: {', '.join(missing)}."))
+    if calibration.undetermined_slopes:
+        parts.append(
+            element(
+                "p",
+                f"Of {', '.join(calibration.undetermined_slopes)} only the shape is known, given with 0 at both ends.",
+            )
+        )
+    if calibration.unseen_faults:
+        parts.append(element("h3", "Faults of readings that no fit would show"))
+        parts.append(listed([f"{text[0].upper()}{text[1:]}." for text in calibration.unseen_faults]))
+    return section("open", title, *parts)
+
+
+def _missing(calibration: Calibration) -> list[str]:
+    """Parameters without values."""
+    return [
+        name for name in (*FUNCTIONS, *SQUARENESSES) if name not in {*calibration.functions, *calibration.squareness}
+    ]
+
+
+def method_section(contents: Contents) -> Markup:
+    """How it was measured and evaluated, and how the signs are."""
+    calibration = contents.calibration
+    ways = {
+        "adjustment": "Least squares over all readings at once, with the exact pose of the machine. Unknowns are the "
+        "21 error parameters, and how head and mirror stood on each line.",
+        "enhanced": "Distances, tilts and scale lines, to first order.",
+        "conventional": "Distances of body diagonals, to first order.",
+    }
+    rows: list[tuple[str, object]] = [
+        (
+            "Measurement",
+            "The machine moves a mirror along diagonals of its volume, in steps of one axis after the other. A laser "
+            "head that stands still reads its distance, and with most heads its tilts, at every point.",
+        ),
+        ("Evaluation", f"{calibration.method or 'not known'}. {ways.get(calibration.method, '')}"),
+    ]
+    if contents.lines:
+        rows.append(("Lines", ", ".join(contents.lines)))
+    if contents.details is not None:
+        rows.append(("Readings", f"{len(contents.details.line)} points, {', '.join(contents.details.channels)}"))
+    rows += [
+        ("Tool offset", f"{', '.join(position(t) for t in calibration.tool)} mm"),
+        (
+            "Signs",
+            "Actual less commanded. Rotations and squarenesses by the right-hand rule. Errors are those of the tool "
+            "relative to the workpiece.",
+        ),
+        ("Reference", f"{calibration.straightness_reference[0].upper()}{calibration.straightness_reference[1:]}."),
+        ("Uncertainties", "95 % intervals are ± 1.96 standard uncertainties (GUM), of each value by itself."),
+        (
+            "Error in the volume",
+            "Actual less commanded position of the functional point, by the exact pose of the machine, at the nodes of "
+            "the tables (of more than 201, at 201 of them).",
+        ),
+    ]
+    return section("method", "Method", definitions(rows, "lines"))
+
+
+def provenance_section(contents: Contents) -> Markup:
+    """Fingerprints of what the calibration was made from, and what does not fit."""
+    made = contents.calibration.provenance
+    rows = [[words, element("code", made[key])] for key, words in PROVENANCE.items() if key in made]
+    parts: list[Any] = []
+    if rows:
+        parts.append(table("What the calibration was made from", ["What", "Fingerprint or version"], rows, "prints"))
+    else:
+        parts.append(element("p", "The file does not say what it was made from."))
+    parts += [element("p", note, class_="note") for note in contents.notes]
+    files = [
+        ("Calibration", contents.request.calibration),
+        ("Before", contents.request.before),
+        ("Scenario", contents.request.scenario),
+        ("Run", contents.request.run),
+        ("Uncertainty", contents.request.uncertainty),
+    ]
+    parts.append(
+        element(
+            "p",
+            "Files of this report: "
+            + "; ".join(f"{what.lower()} {path.name}" for what, path in files if path is not None)
+            + ".",
+        )
+    )
+    return section("provenance", "Provenance", *parts)
+
+
+def commands_section(contents: Contents, command: str) -> Markup:
+    """The commands that repeat all of it."""
+    request, method = contents.request, contents.calibration.method
+    scenario, run = (
+        shlex.quote(path.name) if path else name
+        for path, name in ((request.scenario, "SCENARIO"), (request.run, "RUN"))
+    )
+    calibration = shlex.quote(request.calibration.name)
+    option = "" if method in ("adjustment", "") else f" -m {method}"
+    covariance = " --covariance" if contents.calibration.covariance is not None else ""
+    lines = [
+        f"sha256sum {scenario} {run}",
+        f"stepdiag check {scenario} {run}",
+        f"stepdiag evaluate {scenario} {run}{option}{covariance} -o {calibration}",
+        command,
+    ]
+    return section(
+        "commands",
+        "Commands that repeat it",
+        element(
+            "p",
+            "The fingerprints above show whether the files are the same. Words in capitals stand for files that were "
+            "not given.",
+        ),
+        element("pre", element("code", "\n".join(lines))),
+    )
+
+
+def _probability(probability: float | None) -> str:
+    if probability is None:
+        return NOT_KNOWN
+    return f"{probability:.2g}" if probability >= LEAST_PROBABILITY else f"below {LEAST_PROBABILITY:g}"
+
+
+def comparison_section(contents: Contents) -> Markup | None:
+    """Before and after: in the volume, and parameter by parameter."""
+    comparison, change = contents.comparison, contents.change
+    if comparison is None or change is None:
+        return None
+    rows = []
+    for difference in comparison.differences:
+        kind, k = kind_of(difference.parameter), difference.largest
+        unit, u = REPORT_UNIT[kind], float(difference.standard_uncertainty[k])
+        rows.append(
+            [
+                difference.parameter.replace("_", " ") + (" shape" if difference.shape_only else ""),
+                with_interval(in_report_units(kind, float(difference.value[k])), in_report_units(kind, u), unit),
+                "" if np.isnan(difference.position[k]) else f"{position(difference.position[k])} mm",
+                _probability(comparison.probability(difference)),
+                "significant" if comparison.is_significant(difference) else "",
+            ]
+        )
+    volume = [
+        [
+            name,
+            with_ends(figure.a, figure.a_interval),
+            with_ends(figure.b, figure.b_interval),
+            with_ends(figure.change, figure.interval),
+            "" if "rejected" in (comparison.a.fit, comparison.b.fit) else figure.verdict or "",
+        ]
+        for name, figure in (("largest", change.largest), ("root mean square", change.rms))
+    ]
+    effects = [
+        [
+            one.parameter,
+            with_ends(one.largest, None),
+            with_ends(one.rms, None),
+            "significant" if one.significant else "",
+        ]
+        for one in change.effects[:MOST_EFFECTS]
+    ]
+    notes = [f"no verdict: {change.no_verdict_because}"] if change.no_verdict_because else []
+    notes += [_of_before_and_after(note) for note in comparison.notes]
+    if comparison.only_in_a:
+        notes.append(f"only before: {', '.join(comparison.only_in_a)}")
+    if comparison.only_in_b:
+        notes.append(f"only after: {', '.join(comparison.only_in_b)}")
+    return section(
+        "comparison",
+        "Before and after",
+        element(
+            "p",
+            element("strong", _verdict_of(change, (comparison.a.fit, comparison.b.fit))),
+            " The curves above show the earlier calibration dashed.",
+        ),
+        None if is_valid(comparison.a) else element("p", f"{headline(comparison.a, EARLIER)}.", class_="note"),
+        table("Error of the tool in the volume", ["", "before", "after", "change", ""], volume),
+        table("Error in the volume that one difference makes alone", ["Parameter", "largest", "rms", ""], effects),
+        table(
+            "Largest difference of each parameter, after less before",
+            ["Parameter", "difference (95 %)", "at", "probability by chance", ""],
+            rows,
+        ),
+        element(
+            "p",
+            f"Probability: that chance alone makes any of the {comparison.count} values differ so (Bonferroni); "
+            f"significant up to {comparison.limit:g}.",
+            class_="note",
+        ),
+        listed([_sentence(note) for note in notes]) if notes else None,
+    )
+
+
+def _of_before_and_after(note: str) -> str:
+    """A note of a comparison of A and B, in the words of the page."""
+    for theirs, ours in (
+        ("A and B", "before and after"),
+        ("A is unverified", "the earlier calibration is unverified"),
+        ("B is unverified", "this calibration is unverified"),
+    ):
+        note = note.replace(theirs, ours)
+    return note
+
+
+def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:
+    figure = change.largest
+    if "rejected" in fits:
+        return "A fit is rejected: these figures do not tell whether the machine has changed."
+    if math.isnan(figure.change):
+        return "Whether the error in the volume has changed is not known."
+    way = "smaller" if figure.change < 0.0 else "larger"
+    said = f"The largest error in the volume is {with_ends(abs(figure.change), None)} {way} than before."
+    return f"{said} {figure.verdict.capitalize()}." if figure.verdict else said
