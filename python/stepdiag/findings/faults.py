@@ -49,7 +49,7 @@ def _alternative(fault: Fault) -> str:
 def _doubt(found: FaultClass) -> str:
     if found.told_apart:
         return ""
-    return "the readings do not tell which (stepdiag observe says which plan would)"
+    return "the readings do not distinguish them (stepdiag observe says which plan would)"
 
 
 def _treatment(found: FaultClass) -> str:

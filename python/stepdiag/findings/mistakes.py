@@ -41,6 +41,6 @@ def mistake_text(found: Sequence[FoundMistake]) -> str:
         texts.append(f"one of {best.alternatives} more")
     said = texts[0] if len(texts) == 1 else f"either {'; or '.join(texts)}"
     if best.or_faults:
-        said += ", or it is the faults that were found, which no reading tells from that"
+        said += ", or the faults that were found happened instead (the readings do not distinguish them)"
     before = "" if best.variance_factor_before is None else f" in place of {best.variance_factor_before:.3g}"
     return f"{said}; with that undone the fit is {best.fit} (variance factor {best.variance_factor:.3g}{before})"

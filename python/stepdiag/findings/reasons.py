@@ -70,8 +70,8 @@ def reason_text(reason: FitReason) -> str:
             value, unit = report_value(units_of(reason.parameter), reason.value)
             limit, _ = report_value(units_of(reason.parameter), reason.limit)
             return (
-                f"what fault {reason.fault} may be, and no reading tells, makes a difference of {value:.3g} {unit} in "
-                f"{reason.parameter} ({limit:g} {unit} is plausible)"
+                f"the readings do not distinguish the alternatives of fault {reason.fault}, which change "
+                f"{reason.parameter} by {value:.3g} {unit} ({limit:g} {unit} is plausible)"
             )
         case "fault_cost":
             return (

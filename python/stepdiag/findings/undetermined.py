@@ -11,7 +11,7 @@ REASONS: Final = {
     "not_seen": "",
     "not_moved": "no reading on a line that moves the axis to its end",
     "not_separated": "the readings do not distinguish them",
-    "tool_rotations": "its line does not tell it from rotations that move the tool",
+    "tool_rotations": "its line does not separate it from rotations that move the tool",
     "few_tilts": "with tilts",
     "few_lengths": "with distance, tilts and known angles",
     "few_diagonals": "among the body diagonals",

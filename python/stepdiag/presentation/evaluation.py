@@ -120,7 +120,7 @@ def expansion_rows(estimates: Iterable[ExpansionEstimate], *, values: bool = Tru
         numbers = (estimate.stated, estimate.prior, estimate.value, estimate.standard_uncertainty)
         stated, prior, value, u = (number * MICRO for number in numbers)
         scales = "the scales" if len(estimate.axes) == 3 else f"the scale of {'XYZ'[estimate.axes[0]]}"
-        found = "the readings tell nothing more"
+        found = "the readings add nothing"
         if u < NOTHING_LEARNT * prior:
             found = f"found {value:.4g} ± {u:.2g}" if values else f"found to ± {u:.2g}"
         yield f"expansion of {scales}: stated {stated:.4g} ± {prior:.2g} µm/(m·K), {found}"
@@ -133,7 +133,7 @@ def machine_drift_rows(estimates: Iterable[DriftEstimate], known: Known, *, valu
     factor, unit = (HOUR / MICROMETRE, "µm/h") if by_time else (1.0 / MICROMETRE, "µm/K")
     for estimate in estimates:
         value, u, prior = (factor * x for x in (estimate.value, estimate.standard_uncertainty, estimate.prior))
-        found = "the readings tell nothing more"
+        found = "the readings add nothing"
         if u < NOTHING_LEARNT * prior:
             found = f"found to ± {u:.2g}"
             if values:

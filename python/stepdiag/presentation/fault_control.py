@@ -19,7 +19,7 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
     """Each kind of fault: from which size on one is found, what it may do up to there, and whether it is told from
     others."""
     yield "faults that the readings control, one at a time: found (99 %) from which size on, the largest effect of a"
-    yield "fault just not found, and from which size on it is told from all others:"
+    yield "fault just not found, and the size from which it is distinguished from all others:"
     yield f"  {'':<18}{'found from':>14}" + "".join(f"{kind:>14}" for kind in KINDS) + "  distinguished"
     yield f"  {'':<18}{'':>14}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
     for c in controls:
@@ -30,7 +30,7 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
             yield f"  {name(c)}: {c.uncontrolled} of {c.count + c.uncontrolled} that no other reading controls"
     for c in controls:
         if c.twins:
-            yield f"  {name(c)} not told from a twin: by {_unit(c)} of it {_shared(c)}"
+            yield f"  {name(c)} not distinguished from a twin: by {_unit(c)} of it {_shared(c)}"
 
 
 def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[str]:

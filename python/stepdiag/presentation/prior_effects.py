@@ -54,7 +54,7 @@ def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
             # D^2 - D l - l^2/2 of two directions.
             mean = 2.0 * mirror**2 - laser**2
             yield (
-                f"{which}no reading tells the mirror's angle against the beam, taken to be known to "
+                f"{which}the readings do not determine the angle of the mirror to the beam, taken to be known to "
                 f"{mirror * MICRO:g} µrad (reflector_urad), and the laser along the axis to {laser * MICRO:g} µrad: "
                 f"they read {abs(mean) * MICRO:.2g} µm/m too {'long' if mean > 0.0 else 'short'} on average; that is "
                 "in the uncertainties, not corrected"

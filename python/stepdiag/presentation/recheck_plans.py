@@ -37,7 +37,7 @@ def recheck_plan_rows(found: Sequence[Power], minutes: float, limit: float, alph
         table.insert(2 + in_time, f"  -- {minutes:g} minutes: the available time --")
     yield from table
     yield f"-: none, or more than {BEYOND:g} times the prior of [change]"
-    yield "hidden: what changes that the readings do not tell may move the tool by, together (k = 2)"
+    yield "hidden: how far changes that the readings do not determine may move the tool, together (k = 2)"
 
 
 def recheck_advice(found: Sequence[Power], minutes: float, limit: float) -> Iterator[str]:

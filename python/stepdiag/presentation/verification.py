@@ -94,8 +94,9 @@ def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeError
     """The verdict first; then what is known of each change, what may be hidden, and the volume's error."""
     found = judged.recheck
     tested = (
-        f"chi-square {found.chi_square:.1f} of {found.degrees_of_freedom} directions of change that the readings tell; "
-        f"by chance it is larger in {_percent(found.probability)} of cases (limit {100.0 * judged.alpha:g} %)"
+        f"chi-square {found.chi_square:.1f} of {found.degrees_of_freedom} directions of change that the readings "
+        f"determine; by chance it is larger in {_percent(found.probability)} of cases "
+        f"(limit {100.0 * judged.alpha:g} %)"
     )
     without = ", by the readings that are not left out" if found.left_out else ""
     match judged.verdict:
@@ -118,16 +119,16 @@ def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeError
             yield from fault_rows(found.left_out)
     told = [term for term in found.terms if term.told >= TOLD]
     if told:
-        yield "changes that the readings tell one by one, U their expanded uncertainty (k = 2):"
+        yield "changes that the readings determine one by one, U their expanded uncertainty (k = 2):"
         yield from text_columns([("parameter", "change", "", "U", ""), *map(_change_row, told)], left=(0, 2, 4))
     together = [term for term in found.terms if UNTOLD < term.told < TOLD]
     if together:
-        yield f"told together only: {', '.join(f'{term.parameter} ({term.kind})' for term in together)}"
+        yield f"determined only together: {', '.join(f'{term.parameter} ({term.kind})' for term in together)}"
         sums = [text for one in found.combinations if (text := _sum_text(one, found.terms, together))]
         yield from (f"  {text}" for text in sums)
     untold = [f"{term.parameter} ({term.kind})" for term in found.terms if term.told <= UNTOLD]
     if untold:
-        yield f"not told: {', '.join(untold)}"
+        yield f"not determined: {', '.join(untold)}"
     yield (
         f"changes that are not seen may move the tool by {judged.hidden / MICROMETRE:.1f} µm somewhere in the volume "
         "(k = 2, with the priors of [change])"

@@ -125,7 +125,7 @@ def test_a_factor_on_one_line_is_named_once() -> None:
     assert {fault.kind for found in adjustment.faults for fault in found.members} >= {"factor"}
     (found,) = sd.find_mistakes(scenario, wrong, adjustment)
     assert "on the scale lines" in found.text
-    assert "or it is the faults that were found, which no reading tells from that" in mistake_text([found])
+    assert "or the faults that were found happened instead (" in mistake_text([found])
     # Without an adjustment nobody else says so.
     assert any("on line npp has a factor" in found.text for found in sd.find_mistakes(scenario, wrong))
 

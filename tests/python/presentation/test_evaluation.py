@@ -95,7 +95,7 @@ def test_outlier_that_may_be_another_is_said_to_be_so(tmp_path: Path, capsys: py
     said = report(tmp_path, capsys, NOISY, spoilt(run, {"distance": (rows[7], 3e-3)}))
     (fault,) = [line for line in said.splitlines() if line.startswith("fault 1: ")]
     assert "distance of npp point 7" in fault
-    assert "; the readings do not tell which (stepdiag observe says which plan would)" in fault
+    assert "; the readings do not distinguish them (stepdiag observe says which plan would)" in fault
     assert fault.endswith("all of these readings are left out")
 
 
@@ -121,11 +121,11 @@ def test_scale_lines_whose_mirror_no_reading_tells_have_a_word_on_it(
     run = sd.Measurement(run.line, run.point.tolist(), run.position, channels, run=run.run.tolist())
     own = "[adjustment.p00]\nreflector_urad = 300.0\n[adjustment.0p0]\nreflector_urad = 'fixed'\n"
     said = report(tmp_path, capsys, NOISY + own, run)
-    told = "the mirror's angle against the beam, taken to be known to"
+    told = "the angle of the mirror to the beam, taken to be known to"
     # 2 D^2 - l^2 with l known to 500 urad.
-    assert f"scale lines p00: no reading tells {told} 300 µrad (reflector_urad)" in said
+    assert f"scale lines p00: the readings do not determine {told} 300 µrad (reflector_urad)" in said
     assert "they read 0.07 µm/m too short on average" in said
-    assert f"scale lines 00p: no reading tells {told} 500 µrad" in said
+    assert f"scale lines 00p: the readings do not determine {told} 500 µrad" in said
     assert "they read 0.25 µm/m too long on average" in said
     assert "scale lines 0p0: a laser that stands along the axis to 500 µrad reads too short, never too long" in said
 

@@ -24,7 +24,7 @@ from stepdiag.presentation.page.volume import ErrorInVolume, place_of_largest, w
 from stepdiag.units import MICROMETRE
 
 _IS_VALID: Final = {
-    "accepted": "Yes. The readings agree with each other and with the described set-up. This does not tell how "
+    "accepted": "Yes. The readings agree with each other and with the described set-up. This does not say how "
     "accurate the machine is.",
     "doubtful": "Doubtful. The values are the best fit, but the stated uncertainties are not to be relied on.",
     "rejected": "No. The readings contradict each other. Do not correct the machine with these values.",
@@ -457,7 +457,7 @@ def _of_before_and_after(note: str) -> str:
 def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:
     figure = change.largest
     if "rejected" in fits:
-        return "A fit is rejected: these figures do not tell whether the machine has changed."
+        return "A fit is rejected: these figures do not show whether the machine has changed."
     if math.isnan(figure.change):
         return "Whether the error in the volume has changed is not known."
     way = "smaller" if figure.change < 0.0 else "larger"

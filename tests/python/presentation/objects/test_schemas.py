@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 
 from stepdiag.presentation.objects.schemas import OBJECTS, schema_text
 
-SCHEMAS = Path(__file__).parents[3] / "docs" / "json"
+SCHEMAS = Path(__file__).parents[4] / "docs" / "json"
 UNITS = (
     "um",
     "mm",

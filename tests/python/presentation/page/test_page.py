@@ -247,7 +247,7 @@ def test_calibration_and_machine_are_asked_about_by_name(
     text = page_of(calibration=Path("judged.nc"), limit=0.001).text
     assert f"The machine Is the machine within 1 µm? {of_machine}" in text
     assert f"The calibration Is this calibration valid? {is_valid}" in text
-    assert ("This does not tell how accurate the machine is." in text) == (fit == "accepted")
+    assert ("This does not say how accurate the machine is." in text) == (fit == "accepted")
     without = page_of(calibration=Path("judged.nc")).text
     assert "Is the machine within its limit? Not asked: the report was made without a limit." in without
 
@@ -470,7 +470,7 @@ def test_rejected_calibration_ends_with_status_three_and_is_written(evaluated: P
         assert main(["report", *calibrations, "-o", "report.html"]) == 3
         page = Page(Path("report.html").read_text())
         if len(calibrations) == 2:
-            assert "A fit is rejected: these figures do not tell whether the machine has changed." in page.text
+            assert "A fit is rejected: these figures do not show whether the machine has changed." in page.text
             assert "Improved" not in page.text
             assert "Worse" not in page.text
 
