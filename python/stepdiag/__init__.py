@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from stepdiag.calibration.volume import errors_at, volume
     from stepdiag.calibration.volume_change import volume_change
     from stepdiag.evaluation.judge import evaluate, judge
-    from stepdiag.exporting.common import ExportOptions
+    from stepdiag.exporting.options import ExportOptions
     from stepdiag.exporting.write import export
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.mistakes.search import find_mistakes
@@ -142,7 +142,7 @@ _LATER = {
         "evaluate",
         "judge",
     ),
-    "exporting.common": ("ExportOptions",),
+    "exporting.options": ("ExportOptions",),
     "exporting.write": ("export",),
     "io.data_files": (
         "read_calibration",

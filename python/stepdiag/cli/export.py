@@ -5,8 +5,9 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes, json_option, tell, tell_trust, trust_warnings
+from stepdiag.cli.options import PATH, Writes, json_option, made_of, options_of, tell, tell_trust, trust_warnings
 from stepdiag.cli.terminal import say
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.io.outputs import (
     COMP_FILE,
     COMP_LINES,
@@ -33,7 +34,6 @@ KINDS = {
 }
 FORMATS = ("linuxcnc-comp", *KINDS)
 FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # linuxcnc-comp
-MM = "<X Y Z>"
 
 
 @click.command(
@@ -54,46 +54,11 @@ MM = "<X Y Z>"
     metavar="OUT",
     help="File to write (.csv; .hal for matrix and calibxyzkins); for linuxcnc-comp a folder.",
 )
-@click.option("--tool", type=float, nargs=3, metavar=MM, help="Tool offset, mm.  [default: the calibration's]")
-@click.option(
-    "--origin", type=float, nargs=3, metavar=MM, help="Controller's coordinates of home, mm.  [default: 0 0 0]"
-)
-@click.option("--incomplete", is_flag=True, help="Export undetermined values as 0.")
-@click.option(
-    "--approach",
-    type=click.Choice(("mean", "positive", "negative")),
-    help="Direction of approach to compensate if the tables have two (not linuxcnc-comp, squareness).  [default: mean]",
-)
-@click.option(
-    "--at",
-    type=float,
-    nargs=3,
-    metavar=MM,
-    help="Point on the corrected lines, mm from home (linuxcnc-comp, position-error).  [default: centre of the volume]",
-)
-@click.option(
-    "--rows",
-    type=int,
-    metavar="N",
-    help="Largest number of rows in a table (linuxcnc-comp, isg, position-error).  [default: 256, 5000, every node]",
-)
-@click.option("--axis", type=click.Choice(tuple("XYZ")), help="The axis that is in error (position-error).")
-@click.option("--depends-on", type=click.Choice(tuple("XYZ")), help="The axis on whose position it depends, or itself.")
-@click.option(
-    "--squareness",
-    type=click.Choice(("straightness", "parameters")),
-    help="Where to write squareness (isg).  [default: straightness]",
-)
-@click.option(
-    "--nodes", type=int, nargs=3, metavar="<NX NY NZ>", help="Points of the grid (csv-grid).  [default: 11 11 11]"
-)
-@click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, instead of --nodes (csv-grid).")
-@click.option("--accept-rejected", is_flag=True, help="Export a calibration even if its fit was rejected.")
-@click.option("--orientation", is_flag=True, default=None, help="Also write the rotations of the tool (csv-grid).")
+@options_of(ExportOptions)
 @json_option
 @click.pass_context
 def export(
-    context: click.Context, /, calibration: Path, to: str, output: OutputFile, as_json: bool, **options: Any
+    context: click.Context, /, calibration: Path, to: str, output: OutputFile, as_json: bool, **given: Any
 ) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
@@ -112,7 +77,6 @@ def export(
     calibration that does not determine all that the format needs, unless --incomplete is
     given. An error map is accepted as well; parameters that it lacks are 0.
     """
-    from stepdiag.exporting.common import ExportOptions
     from stepdiag.exporting.write import check_fit, read_what_is_exported, write_export
     from stepdiag.io.whole_files import check_input
 
@@ -120,11 +84,12 @@ def export(
         path = OutputFile(output.path, (KINDS[to],)).claim(calibration)
     else:
         path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
+    options = made_of(ExportOptions, given)
     check_input(calibration)
     read = read_what_is_exported(calibration)
-    check_fit(read, f"{calibration}", options["accept_rejected"])
+    check_fit(read, f"{calibration}", options.accept_rejected)
     with Progress("export"):
-        done = write_export(read, to, path, ExportOptions(**options))
+        done = write_export(read, to, path, options)
     if as_json:
         from stepdiag.presentation.objects.export import export_object
         from stepdiag.presentation.objects.writer import json_text

@@ -5,7 +5,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import Field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import click
 from click.shell_completion import CompletionItem
@@ -89,24 +90,32 @@ def _name(field: Field[Any]) -> str:
     return field.metadata["name"] or field.name
 
 
-def _option(field: Field[Any], kind: Any) -> Callable[[Command], Command]:
-    about, flag = field.metadata, f"--{_name(field).replace('_', '-')}"
+def _option(field: Field[Any], hint: Any) -> Callable[[Command], Command]:
+    about, flag, default = field.metadata, f"--{_name(field).replace('_', '-')}", field.default
+    kind = _kind(hint)
     if kind is bool:
-        return click.option(flag, is_flag=True, help=about["meaning"])
-    default = field.default
+        names = f"{flag}/--no-{flag.removeprefix('--')}" if default else flag
+        return click.option(names, is_flag=True, default=default, show_default=bool(default), help=about["meaning"])
     if about["words"]:
         default = next(word for word, value in about["words"].items() if value == default)
-    elif kind is float:
+    elif kind is float and default is not None:
         default = default / about["factor"]
-    shown = default is not None
+    count = len(get_args(kind)) if get_origin(kind) is tuple and about["parse"] is None else 1
     return click.option(
         flag,
-        type=_type(about, kind),
+        type=_type(about, get_args(kind)[0] if count > 1 else kind),
+        nargs=count,
         default=default,
-        show_default=shown,
+        show_default=default not in (None, ""),
         metavar=about["metavar"],
         help=about["meaning"],
     )
+
+
+def _kind(hint: Any) -> Any:
+    """The type of a field beside None."""
+    kinds = [one for one in get_args(hint) if one is not NoneType] if get_origin(hint) in (Union, UnionType) else [hint]
+    return kinds[0]
 
 
 def _type(about: Any, kind: Any) -> Any:
@@ -116,7 +125,9 @@ def _type(about: Any, kind: Any) -> Any:
     if get_origin(kind) is Literal:
         return click.Choice(list(get_args(kind)))
     if kind is int:
-        return click.IntRange(least)
+        return int if least is None else click.IntRange(least)
+    if kind is float and (least, above) == (None, None):
+        return float
     if kind is float:
         return click.FloatRange(min=least if above is None else above, min_open=above is not None)
     return str

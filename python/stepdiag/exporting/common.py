@@ -1,44 +1,21 @@
 """What the export formats share: options, checks and notes, nodes and error maps."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
+from stepdiag.exporting.options import Approach, ExportOptions
 from stepdiag.findings.temperature import temperature_rows
 from stepdiag.parameters import AXES
 
 FloatArray = npt.NDArray[np.float64]
-Triple = tuple[float, float, float]
-Approach = Literal["mean", "positive", "negative"]
 APPROACHES: Final[tuple[Approach, ...]] = ("mean", "positive", "negative")
 APPROACH_WORDS: Final[Mapping[Approach, str]] = {"mean": "mean of both", "positive": "+", "negative": "-"}
 
 SAME_NODE: Final = 1e-6  # mm: closer nodes count as one; tables have nine digits after the point
-
-
-@dataclass(frozen=True)
-class ExportOptions:
-    """Options of an export. None: the default of the format, see `stepdiag export --help`.
-
-    `export` refuses options that its format does not use."""
-
-    tool: Triple | None = None  # tool offset, mm; None: the calibration's
-    origin: Triple | None = None  # home in the controller's coordinates, mm; None: 0 0 0
-    incomplete: bool = False  # export undetermined values as 0
-    approach: Approach | None = None  # direction to export if there are two; None: mean
-    at: Triple | None = None  # linuxcnc-comp, position-error: point on corrected lines, mm from home; None: centre
-    rows: int | None = None  # linuxcnc-comp, position-error, isg: largest number of rows in a table
-    axis: str | None = None  # position-error: X, Y or Z, the axis whose error is exported
-    depends_on: str | None = None  # position-error: X, Y or Z, the axis on whose position it depends
-    nodes: tuple[int, int, int] | None = None  # csv-grid: points along X, Y, Z
-    step: float | None = None  # csv-grid: largest spacing, mm
-    orientation: bool | None = None  # csv-grid: export rotations as well
-    squareness: Literal["straightness", "parameters"] | None = None  # isg: where to put it
-    accept_rejected: bool = False  # export a calibration with a rejected fit
 
 
 def require(calibration: Calibration, names: Sequence[str], options: ExportOptions) -> list[str]:

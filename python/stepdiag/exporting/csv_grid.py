@@ -14,7 +14,6 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.exporting.common import (
-    ExportOptions,
     FloatArray,
     common_nodes,
     compensated_map,
@@ -27,6 +26,7 @@ from stepdiag.exporting.common import (
     tool_of,
     words,
 )
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of
 from stepdiag.findings.meaning import trust_rows, unverified_key
 from stepdiag.findings.temperature import temperature_text

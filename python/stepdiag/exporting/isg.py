@@ -23,7 +23,6 @@ import numpy as np
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
 from stepdiag.exporting.common import (
     APPROACH_WORDS,
-    ExportOptions,
     FloatArray,
     common_nodes,
     compensated_map,
@@ -37,6 +36,7 @@ from stepdiag.exporting.common import (
     words,
 )
 from stepdiag.exporting.fewest_nodes import best_subset
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of
 from stepdiag.findings.meaning import provenance_rows, trust_rows
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES

@@ -21,7 +21,6 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.exporting.common import (
-    ExportOptions,
     FloatArray,
     common_nodes,
     in_ascii,
@@ -35,6 +34,7 @@ from stepdiag.exporting.common import (
 )
 from stepdiag.exporting.fewest_nodes import best_subset
 from stepdiag.exporting.left_in_volume import left_in_volume, what_is_left
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of
 from stepdiag.findings.meaning import provenance_rows, trust_rows
 from stepdiag.io.comp_set import fingerprint_rows

@@ -10,15 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Calibration, Compensator
-from stepdiag.exporting.common import (
-    ExportOptions,
-    FloatArray,
-    origin_of,
-    require,
-    temperature_row,
-    tool_of,
-    words,
-)
+from stepdiag.exporting.common import FloatArray, origin_of, require, temperature_row, tool_of, words
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of
 from stepdiag.findings.meaning import trust_rows
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES

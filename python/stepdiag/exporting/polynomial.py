@@ -22,16 +22,9 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, ErrorMap, Machine
-from stepdiag.exporting.common import (
-    ExportOptions,
-    FloatArray,
-    compensated_map,
-    in_ascii,
-    origin_of,
-    require,
-    tool_of,
-)
+from stepdiag.exporting.common import FloatArray, compensated_map, in_ascii, origin_of, require, tool_of
 from stepdiag.exporting.left_in_volume import LeftInVolume, Motors, left_in_volume, volume_grid_of, what_is_left
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of, csv_leading, heading
 from stepdiag.findings.meaning import provenance_rows
 from stepdiag.io.csv_text import csv_text

@@ -18,7 +18,6 @@ import numpy as np
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument, Machine
 from stepdiag.exporting.common import (
-    ExportOptions,
     FloatArray,
     common_nodes,
     compensated_map,
@@ -31,6 +30,7 @@ from stepdiag.exporting.common import (
 )
 from stepdiag.exporting.fewest_nodes import best_subset
 from stepdiag.exporting.left_in_volume import left_in_volume, what_is_left
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of, csv_leading, heading
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES

@@ -8,7 +8,6 @@ from typing import Any, Final
 from stepdiag._core import Calibration
 from stepdiag.exporting.common import (
     APPROACH_WORDS,
-    ExportOptions,
     in_ascii,
     origin_of,
     temperature_row,
@@ -17,6 +16,7 @@ from stepdiag.exporting.common import (
     words,
 )
 from stepdiag.exporting.left_in_volume import LeftInVolume
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.findings.meaning import trust_rows, unverified_key
 from stepdiag.io.csv_text import lengths
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES

@@ -14,11 +14,12 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
-from stepdiag.exporting.common import ExportOptions, tool_of
+from stepdiag.exporting.common import tool_of
 from stepdiag.exporting.csv_grid import csv_grid
 from stepdiag.exporting.isg import isg
 from stepdiag.exporting.linuxcnc_comp import linuxcnc_comp
 from stepdiag.exporting.linuxcnc_kins import linuxcnc_kins
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.polynomial import calibxyzkins, matrix, squareness
 from stepdiag.exporting.position_error import position_error
 from stepdiag.exporting.result import Export

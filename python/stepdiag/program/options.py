@@ -1,15 +1,19 @@
 """Options of a measuring program, with defaults and checks."""
 
 from dataclasses import dataclass
-from typing import Final, get_args
+from typing import TYPE_CHECKING, Final, get_args
 
 import numpy as np
 
 from stepdiag._core import InvalidArgument
+from stepdiag.option_field import option
 from stepdiag.program.gcode import Dialect, DwellWord, Trigger, Writer
 from stepdiag.program.path import Space
-from stepdiag.scenario.known import Known
 
+if TYPE_CHECKING:
+    from stepdiag.scenario.known import Known
+
+Triple = tuple[float, float, float]
 COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")
 
 
@@ -17,20 +21,38 @@ COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")
 class Options:
     """Options of a program. Lengths in mm, in the controller's coordinates. None has a default."""
 
-    dialect: Dialect = "linuxcnc"
-    coordinates: str | None = None  # None: G53 for linuxcnc, else G54
-    decimals: int | None = None  # None: 6 for linuxcnc, else 4
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    safe: tuple[float, float, float] | None = None
-    retreat: str = "ZXY"
-    overrun: float = 1.0
-    limits: tuple[float, float, float, float, float, float] | None = None  # X from, to, Y from, to, Z from, to
-    trigger: Trigger | None = None  # None: handshake for linuxcnc, else dwell
-    trigger_code: str = ""
-    timeout: float = 300.0  # s, of a handshake
-    dwell_word: DwellWord = "P"
-    align: bool = True
-    line_numbers: bool = False
+    dialect: Dialect = option("linuxcnc", "LinuxCNC's G-code, or words of ISO 6983 that most controllers understand.")
+    origin: Triple = option((0.0, 0.0, 0.0), "Coordinates of home, mm.", metavar="X Y Z")
+    coordinates: str | None = option(
+        None,
+        "Machine coordinates G53, or a work offset G54 to G59.  [default: G53 for linuxcnc, G54 for iso]",
+        metavar="G5x",
+    )
+    limits: tuple[float, float, float, float, float, float] | None = option(
+        None,
+        "Limits of travel of X, Y, Z, mm; no move exceeds them.  [default: unlimited]",
+        metavar="X X Y Y Z Z",
+    )
+    overrun: float = option(1.0, "Overrun before the first point of a line, mm.", metavar="MM")
+    safe: Triple | None = option(
+        None,
+        "Position of the axes for a set-up.  [default: the middle of X and Y, the far end of Z]",
+        metavar="X Y Z",
+    )
+    retreat: str = option("ZXY", "Order in which the axes move to the safe position, one at a time.", metavar="ORDER")
+    trigger: Trigger | None = option(
+        None,
+        "How the program requests a reading (docs/measuring.md); code: by --trigger-code.  "
+        "[default: handshake for linuxcnc, dwell for iso]",
+    )
+    trigger_code: str = option("", "Your own M-code that requests a reading.", metavar="M80")
+    timeout: float = option(300.0, "Seconds that a handshake waits for a reading.", metavar="S")
+    dwell_word: DwellWord = option("P", "G4 takes seconds as P, X or F, or milliseconds as P (PMS).")
+    decimals: int | None = option(
+        None, "Decimal places of positions in mm.  [default: 6 for linuxcnc, 4 for iso]", metavar="N"
+    )
+    align: bool = option(True, "Stop at the first point of a line to align the beam.")
+    line_numbers: bool = option(False, "Number the blocks (iso).")
 
 
 def writer_of(options: Options) -> Writer:
@@ -60,7 +82,7 @@ def trigger_of(options: Options) -> Trigger:
     return trigger
 
 
-def space_of(known: Known, options: Options) -> Space:
+def space_of(known: "Known", options: Options) -> Space:
     for name in ("origin", "safe", "limits"):
         if not np.all(np.isfinite(getattr(options, name) or 0.0)):
             raise InvalidArgument(f"{name}: expected finite lengths, got {getattr(options, name)}")

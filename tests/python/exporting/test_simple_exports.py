@@ -18,7 +18,7 @@ from simple_exports import MOTORS, rows_of, settings
 from usual import ALL_CHAINS, CHAIN
 
 import stepdiag as sd
-from stepdiag.exporting.common import ExportOptions
+from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export
 from stepdiag.exporting.write import write_export
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES

@@ -1,0 +1,47 @@
+"""Options of an export."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from stepdiag.option_field import option
+
+Triple = tuple[float, float, float]
+Approach = Literal["mean", "positive", "negative"]
+AxisName = Literal["X", "Y", "Z"]
+XYZ = "<X Y Z>"
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of an export. None: the default of the format, see `stepdiag export --help`. Lengths are in mm.
+
+    `export` refuses options that its format does not use."""
+
+    tool: Triple | None = option(None, "Tool offset, mm.  [default: the calibration's]", metavar=XYZ)
+    origin: Triple | None = option(None, "Controller's coordinates of home, mm.  [default: 0 0 0]", metavar=XYZ)
+    incomplete: bool = option(False, "Export undetermined values as 0.")
+    approach: Approach | None = option(
+        None,
+        "Direction of approach to compensate if the tables have two (not linuxcnc-comp, squareness).  [default: mean]",
+    )
+    at: Triple | None = option(
+        None,
+        "Point on the corrected lines, mm from home (linuxcnc-comp, position-error).  [default: centre of the volume]",
+        metavar=XYZ,
+    )
+    rows: int | None = option(
+        None,
+        "Largest number of rows in a table (linuxcnc-comp, isg, position-error).  [default: 256, 5000, every node]",
+        metavar="N",
+    )
+    axis: AxisName | None = option(None, "The axis that is in error (position-error).")
+    depends_on: AxisName | None = option(None, "The axis on whose position it depends, or itself.")
+    nodes: tuple[int, int, int] | None = option(
+        None, "Points of the grid (csv-grid).  [default: 11 11 11]", metavar="<NX NY NZ>"
+    )
+    step: float | None = option(None, "Largest spacing of the grid, instead of --nodes (csv-grid).", metavar="MM")
+    orientation: bool | None = option(None, "Also write the rotations of the tool (csv-grid).")
+    squareness: Literal["straightness", "parameters"] | None = option(
+        None, "Where to write squareness (isg).  [default: straightness]"
+    )
+    accept_rejected: bool = option(False, "Export a calibration even if its fit was rejected.")
