@@ -68,21 +68,6 @@ Slips to_slips(const std::string& slips) {
     throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + slips + "\"");
 }
 
-// The package's functions that word the reasons of a verdict, and faults that may be unseen.
-py::object& reason_wording() {
-    static py::object& words = *new py::object(py::none());  // outlives the interpreter
-    return words;
-}
-std::vector<std::string> in_words(const std::vector<FitReason>& reasons) {
-    return reason_wording()(reasons).cast<std::vector<std::string>>();
-}
-
-AdjustmentOfRun judged(AdjustmentOfRun found, const FoundBeside& beside) {
-    found.adjustment = judge(std::move(found.adjustment), beside);
-    found.adjustment.calibration.fit_reasons = in_words(found.adjustment.verdict.reasons);
-    return found;
-}
-
 void bind_thresholds(py::module_& m) {
     py::class_<Thresholds> bound(m, "Thresholds",
                                  "Every limit that a verdict, or the search for faults and mistakes, is made with. "
@@ -125,10 +110,6 @@ void bind_thresholds(py::module_& m) {
     bound.def_property_readonly("largest_variance_factor", &Thresholds::largest_variance_factor,
                                 "Square of largest_noise_factor.");
     m.attr("thresholds") = thresholds;
-}
-py::object& unseen_wording() {
-    static py::object& words = *new py::object(py::none());
-    return words;
 }
 
 PriorLike none() { return py::reinterpret_borrow<PriorLike>(py::none()); }
@@ -574,22 +555,12 @@ void bind_result(py::module_& m) {
             "combinations", [](const Result& r) { return r.adjustment.combinations; },
             "What is known of unknowns that are not determined one by one.")
         .def(
-            "with_mistake",
-            [](Result found, const std::string& mistake) { return judged(std::move(found), {mistake, {}}); },
-            py::arg("mistake"), "The same, rejected because this mistake would explain the readings.")
-        .def(
-            "with_implausible_inputs",
-            [](Result found, const std::vector<std::string>& inputs) { return judged(std::move(found), {"", inputs}); },
-            py::arg("inputs"),
-            "The same, at best doubtful where there are inputs that no workshop has, a sentence each.")
-        .def(
-            "with_conditions",
-            [](Result found, const std::vector<std::string>& conditions, const std::string& budget) {
-                found.adjustment.calibration.conditions = conditions;
-                found.adjustment.calibration.budget = budget;
+            "with_calibration",
+            [](Result found, const Calibration& calibration) {
+                found.adjustment.calibration = calibration;
                 return found;
             },
-            py::arg("conditions"), py::arg("budget"), "The same, with these words in the calibration.")
+            py::arg("calibration"), "The same, with this calibration: its own, with more words.")
         .def_property_readonly(
             "smoothness",
             [](const Result& r) {
@@ -613,9 +584,7 @@ AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, con
         const py::gil_scoped_release release;
         return adjust(measurement, plan, kinematics, offset, heads, options);
     };
-    AdjustmentOfRun of_run{result(), measurement.stations()};
-    of_run.adjustment.calibration = worded(of_run.adjustment);
-    return of_run;
+    return {result(), measurement.stations()};
 }
 
 std::optional<FitQuality> fit_quality_of_run(const Measurement& measurement, const Plan& plan, const HeadLike& head,
@@ -630,33 +599,25 @@ std::optional<FitQuality> fit_quality_of_run(const Measurement& measurement, con
 
 }  // namespace
 
-Calibration worded(const Adjustment& adjustment) {
-    Calibration calibration = worded(adjustment.calibration);
-    calibration.fit_reasons = in_words(adjustment.verdict.reasons);
-    calibration.unseen_faults = unseen_wording()(adjustment.unseen, calibration).cast<std::vector<std::string>>();
-    return calibration;
-}
-
 void bind_adjustment(py::module_& m) {
     bind_thresholds(m);
     bind_options(m);
     bind_result(m);
-    m.def(
-        "word_reasons_with",
-        [](const py::typing::Callable<std::vector<std::string>(const std::vector<FitReason>&)>& words) {
-            reason_wording() = words;
-        },
-        py::arg("words"), "Sets the function that makes sentences of the reasons of a verdict; the package does so.");
-    m.def(
-        "word_unseen_faults_with",
-        [](const py::typing::Callable<std::vector<std::string>(const std::vector<UnseenFault>&, const Calibration&)>&
-               words) { unseen_wording() = words; },
-        py::arg("words"),
-        "Sets the function that makes sentences of what faults may be unseen in a calibration; the package does so.");
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "
-          "The options are AdjustmentOptions, or its fields by name. Raises InvalidArgument.");
+          "The options are AdjustmentOptions, or its fields by name. Findings are data; methods.adjust gives them in "
+          "words, too. Raises InvalidArgument.");
+    m.def(
+        "judge",
+        [](AdjustmentOfRun found, const std::string& mistake, const std::vector<std::string>& implausible_inputs) {
+            found.adjustment = judge(std::move(found.adjustment), {mistake, implausible_inputs});
+            return found;
+        },
+        py::arg("adjustment"), py::kw_only(), py::arg("mistake") = "",
+        py::arg("implausible_inputs") = std::vector<std::string>{},
+        "The same, rejected where a mistake would explain the readings; at best doubtful where there are inputs that "
+        "no workshop has, a sentence each.");
     py::class_<FitQuality>(m, "FitQuality", "How well a run fits, and nothing else.")
         .def_readonly("weighted_square_sum", &FitQuality::weighted_square_sum)
         .def_readonly("degrees_of_freedom", &FitQuality::degrees_of_freedom);

@@ -61,7 +61,7 @@ Calibration make_calibration(
     const Names& undetermined_slopes, const Names& undetermined, const std::optional<ArrayLike>& covariance,
     const Tables& reversal, const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
     const std::string& date, const std::optional<std::string>& fit, const std::optional<double>& variance_factor,
-    const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
+    const Names& fit_codes, const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
     const Names& unseen_faults, const Names& conditions, const std::string& budget,
     const std::optional<double>& between_nodes, const std::optional<double>& temperature_reference,
     const std::optional<ArrayLike>& temperature_as_found, const std::optional<ArrayLike>& expansion,
@@ -96,6 +96,7 @@ Calibration make_calibration(
     calibration.date = date;
     if (fit) calibration.fit = fit_of({{"fit", *fit}}, "calibration");
     calibration.variance_factor = variance_factor;
+    calibration.fit_codes = fit_codes;
     calibration.fit_reasons = fit_reasons;
     calibration.uncertainty_scaled = uncertainty_scaled;
     calibration.provenance = provenance;
@@ -131,7 +132,7 @@ void bind_calibration(py::module_& m) {
              py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
-             py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
+             py::arg("fit_codes") = Names{}, py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
              py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{}, py::arg("conditions") = Names{},
              py::arg("budget") = "", py::arg("between_nodes") = std::nullopt,
              py::arg("temperature_reference") = std::nullopt, py::arg("temperature_as_found") = std::nullopt,
@@ -150,6 +151,9 @@ void bind_calibration(py::module_& m) {
                       "tells whether its values are those that were written.")
         .def_readonly("variance_factor", &Calibration::variance_factor,
                       "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
+        .def_readonly("fit_codes", &Calibration::fit_codes,
+                      "Why that verdict, as stable codes: of an adjustment those of FitReason.finding; empty where it "
+                      "is not known.")
         .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
         .def_readonly("unseen_faults", &Calibration::unseen_faults,
                       "How large faults of readings may be in it unseen, and what they then do, a sentence each.")
@@ -213,14 +217,29 @@ void bind_calibration(py::module_& m) {
             py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.")
         .def(
             "judged",
-            [](Calibration c, const std::string& fit, const Names& reasons) {
+            [](Calibration c, const std::string& fit, const Names& reasons, const Names& codes) {
                 c.fit = fit_of({{"fit", fit}}, "calibration");
                 c.fit_reasons = reasons;
+                c.fit_codes = codes;
                 check(c);
                 return c;
             },
-            py::arg("fit"), py::arg("fit_reasons") = Names{},
-            "The same calibration with this verdict of its fit. Raises InvalidArgument for another word.")
+            py::arg("fit"), py::arg("fit_reasons") = Names{}, py::arg("fit_codes") = Names{},
+            "The same calibration with this verdict of its fit. Raises InvalidArgument for another word, and for "
+            "reasons and codes that differ in number.")
+        .def(
+            "with_sentences",
+            [](Calibration c, const Names& undetermined, const Names& fit_reasons, const Names& unseen_faults) {
+                c.undetermined = undetermined;
+                c.fit_reasons = fit_reasons;
+                c.unseen_faults = unseen_faults;
+                check(c);
+                return c;
+            },
+            py::kw_only(), py::arg("undetermined"), py::arg("fit_reasons") = Names{},
+            py::arg("unseen_faults") = Names{},
+            "The same calibration with its findings in these words. Raises InvalidArgument for a sentence of more "
+            "than one line.")
         .def(
             "with_between_nodes",
             [](Calibration c, const std::optional<double>& between_nodes) {

@@ -7,17 +7,6 @@
 
 namespace stepdiag::bindings {
 
-py::object& wording() {
-    static py::object& words = *new py::object(py::none());  // outlives the interpreter
-    return words;
-}
-
-Calibration worded(Calibration calibration) {
-    for (const Undetermined& finding : calibration.findings)
-        calibration.undetermined.push_back(wording()(finding).cast<std::string>());
-    return calibration;
-}
-
 namespace {
 
 template <class Enum, int count>
@@ -45,16 +34,16 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
         return evaluation();
     };
     if (evaluator)
-        return worded(without_lock([&] {
+        return without_lock([&] {
             return evaluator(measurement, plan, kinematics, offset, heads,
                              {uncertainty, full_covariance, plausible, expansion});
-        }));
+        });
     AdjustmentOptions options;
     options.uncertainty = uncertainty;
     options.full_covariance = full_covariance;
     options.plausible = plausible;
     options.expansion = expansion;
-    return worded(without_lock([&] { return adjust(measurement, plan, kinematics, offset, heads, options); }));
+    return without_lock([&] { return adjust(measurement, plan, kinematics, offset, heads, options).calibration; });
 }
 
 void bind_undetermined(py::module_& m) {
@@ -86,10 +75,6 @@ void bind_undetermined(py::module_& m) {
         .def_readonly("setups", &Undetermined::setups, "Of a set-up: (first run, line) of each that is open.")
         .def_static("reasons", &names_of<OpenReason, open_reason_count>)
         .def_static("all_remedies", &names_of<Remedy, remedy_count>);
-    m.def(
-        "word_findings_with",
-        [](const py::typing::Callable<std::string(const Undetermined&)>& words) { wording() = words; },
-        py::arg("words"), "Sets the function that makes a sentence of an Undetermined; the package does so.");
 }
 
 std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(const Calibration& calibration) {
@@ -248,7 +233,8 @@ void bind_evaluation(py::module_& m) {
             "Functions of whose reversal error only the change from home is known; its values are 0 at home.")
         .def_readonly("findings", &Calibration::findings,
                       "What the readings do not determine, why, and what would help; files keep it in words only.")
-        .def_readonly("undetermined", &Calibration::undetermined, "The findings in words; one sentence each.")
+        .def_readonly("undetermined", &Calibration::undetermined,
+                      "The findings in words, one sentence each; empty until they are put in (with_sentences).")
         .def_property_readonly(
             "covariance",
             [](const Calibration& c) {

@@ -71,11 +71,6 @@ DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN 
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
-// The package's function that words a finding: all sentences are made in Python.
-py::object& wording();
-Calibration worded(Calibration calibration);       // with its findings in words; needs the interpreter lock
-Calibration worded(const Adjustment& adjustment);  // its calibration, also with the reasons of its verdict in words
-
 template <class Records>
 py::typing::Tuple<typename Records::value_type, py::ellipsis> to_tuple(const Records& records) {
     py::tuple tuple(records.size());

@@ -146,9 +146,9 @@ void bind_exception(py::module_& m) {
         try {
             if (thrown) std::rethrow_exception(thrown);
         } catch (const NothingDetermined& refusal) {
-            std::string text = refusal.evaluation() + ": nothing can be determined";
-            if (!refusal.findings().empty()) text += ". " + wording()(refusal.findings().front()).cast<std::string>();
-            PyErr_SetString(type.ptr(), text.c_str());
+            const py::object error = type(refusal.evaluation() + ": nothing can be determined");
+            if (!refusal.findings().empty()) error.attr("finding") = refusal.findings().front();
+            PyErr_SetObject(type.ptr(), error.ptr());
         } catch (const InvalidArgument& error) {
             const std::string_view text = error.what();
             const auto message = py::reinterpret_steal<py::object>(

@@ -172,7 +172,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     state_temperature(measurement, options.expansion, result.calibration);
     for (const ExpansionEstimate& found : result.expansion)
         for (const int axis : found.axes) (*result.calibration.expansion)[axis] = found.value;
-    result.calibration.fit = result.verdict.fit;
+    state_verdict(result);
     if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();
     return result;
 }

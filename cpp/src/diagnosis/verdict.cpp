@@ -151,8 +151,16 @@ Adjustment judge(Adjustment adjustment, const FoundBeside& beside) {
         verdict.fit = Fit::rejected;
         verdict.reasons.insert(verdict.reasons.begin(), reason(FitFinding::mistake, beside.mistake));
     }
-    adjustment.calibration.fit = verdict.fit;
+    state_verdict(adjustment);
     return adjustment;
+}
+
+void state_verdict(Adjustment& adjustment) {
+    Calibration& calibration = adjustment.calibration;
+    calibration.fit = adjustment.verdict.fit;
+    calibration.fit_codes.clear();
+    for (const FitReason& reason : adjustment.verdict.reasons)  // alternatives share the sentence of the first
+        if (!reason.alternative || calibration.fit_codes.empty()) calibration.fit_codes.push_back(name(reason.finding));
 }
 
 void scale_uncertainties(Adjustment& adjustment) {

@@ -5,13 +5,12 @@
 
 namespace stepdiag {
 
-// From what the adjustment found, its own verdict not counted, the patterns of its residuals, and the set-up quantities
-// that scatter more than their priors.
 // Reasons where a coefficient of expansion, or a rate of drift, stands too far from what is stated of it.
 std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
                                         const std::vector<DriftEstimate>& machine_drift);
 
-// `residual_rounding`: rms of the residuals, each in units of its rounding (adjustment/channel_model.hpp).
+// From what the adjustment found, its own verdict not counted, the patterns of its residuals, and the set-up quantities
+// that scatter more than their priors. `residual_rounding`: rms of the residuals, each in units of its rounding (adjustment/channel_model.hpp).
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
               const std::vector<ResidualPattern>& prior_scatter, double residual_rounding);
 
@@ -22,5 +21,8 @@ double distance_from_prior(double value, double standard_uncertainty, double pri
 
 // What the treatment of faults costs makes a fit doubtful at best, and comes first.
 void take_costs(const std::vector<FitReason>& costs, Verdict& verdict);
+
+// Takes the adjustment's verdict into its calibration: the fit, and the codes of its reasons.
+void state_verdict(Adjustment& adjustment);
 
 }  // namespace stepdiag

@@ -16,6 +16,8 @@ namespace {
 // apart, 1e-9 where three close beams tell the angles. What is further apart than this belongs to other values.
 constexpr double covariance_tolerance = 1e-6;
 
+constexpr const char* code_letters = "abcdefghijklmnopqrstuvwxyz_";
+
 // NaN: not known.
 bool is_uncertainty(double u) { return std::isnan(u) || (std::isfinite(u) && u >= 0.0); }
 
@@ -137,6 +139,13 @@ void check(const Calibration& calibration) {
     check_provenance(calibration.provenance);
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
     for (const std::string& sentence : calibration.fit_reasons) check_one_line(sentence, "fit_reasons");
+    for (const std::string& code : calibration.fit_codes)
+        if (code.empty() || code.find_first_not_of(code_letters) != std::string::npos)
+            throw InvalidArgument("fit_codes: expected small letters and _, got \"" + code + "\"");
+    if (!calibration.fit_codes.empty() && !calibration.fit_reasons.empty() &&
+        calibration.fit_codes.size() != calibration.fit_reasons.size())
+        throw InvalidArgument("fit_codes: expected one for each of " + std::to_string(calibration.fit_reasons.size()) +
+                              " fit_reasons, got " + std::to_string(calibration.fit_codes.size()));
     for (const std::string& sentence : calibration.unseen_faults) check_one_line(sentence, "unseen_faults");
     for (const std::string& sentence : calibration.conditions) check_one_line(sentence, "conditions");
     check_one_line(calibration.budget, "budget");
@@ -271,6 +280,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
         table.header["expansion_per_k"] = format_lengths(*calibration.expansion);
         table.header["fixed_point_mm"] = format_lengths(calibration.fixed_point);
     }
+    if (!calibration.fit_codes.empty()) table.header["fit_codes"] = join(calibration.fit_codes, " ");
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
     if (!calibration.unseen_faults.empty())
         table.header["unseen_faults"] = join(calibration.unseen_faults, sentence_break);
@@ -304,6 +314,7 @@ Calibration read_calibration(const std::string& path) {
                             {},
                             {}};
     calibration.undetermined = split(optional_value("undetermined"), sentence_break);
+    calibration.fit_codes = split(optional_value("fit_codes"), " ");
     calibration.fit_reasons = split(optional_value("fit_reasons"), sentence_break);
     calibration.unseen_faults = split(optional_value("unseen_faults"), sentence_break);
     calibration.conditions = split(optional_value("conditions"), sentence_break);

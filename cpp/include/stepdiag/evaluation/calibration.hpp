@@ -79,7 +79,9 @@ struct Calibration {
     // Verdict of the fit; none where it is not known, as in files of earlier versions.
     std::optional<Fit> fit = {};
     std::optional<double> variance_factor = {};  // of that fit; none where nothing controls the readings
-    // Why that verdict, in words, one sentence each, as files hold them; an evaluation leaves the words to its caller.
+    // Why that verdict: stable codes, name(FitFinding) of an adjustment; and in words, one sentence each, as files hold
+    // them. An evaluation leaves the words to its caller.
+    std::vector<std::string> fit_codes = {};
     std::vector<std::string> fit_reasons = {};
     // How large faults of readings may be in it unseen, and what they then do; likewise in words.
     std::vector<std::string> unseen_faults = {};
@@ -122,7 +124,7 @@ Eigen::VectorXd calibration_values(const Calibration& calibration);
 // Throws InvalidArgument naming the parameter where a calibration put together by hand is none: a volume that is not
 // positive, nodes that do not ascend, values that are not finite, uncertainties below 0, a covariance that is no matrix
 // of these values (its size, symmetry, |c_ij| <= u_i u_j, c_ii = u_i^2), sentences of more than one line, a provenance
-// of other keys or empty.
+// of other keys or empty, reasons of a verdict and codes that differ in number.
 void check(const Calibration& calibration);
 
 // One line that says to which point the straightnesses of a calibration refer, and what they are at the functional
@@ -136,7 +138,7 @@ ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, date, unverified, fit, variance_factor, uncertainty_scaled,
 // between_nodes_mm, temperature_reference_c with expansion_per_k and fixed_point_mm, or temperature_as_found_c,
-// fit_reasons, unseen_faults, conditions, budget, straightness_reference, provenance_keys, undetermined_slopes,
+// fit_codes, fit_reasons, unseen_faults, conditions, budget, straightness_reference, provenance_keys, undetermined_slopes,
 // undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
 // uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
 // line, also where chain, volume or tool is missing.
