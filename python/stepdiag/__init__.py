@@ -39,15 +39,9 @@ from stepdiag._core import (
     random_error_map,
     read_error_map,
 )
-from stepdiag._core import UnseenFault as _UnseenFault
-from stepdiag._core import word_findings_with as _word_findings_with
-from stepdiag._core import word_reasons_with as _word_reasons_with
-from stepdiag._core import word_unseen_faults_with as _word_unseen_faults_with
 from stepdiag._core import word_wrong_arguments_with as _word_wrong_arguments_with
 from stepdiag.figures.methods import attach as _attach_figures
-from stepdiag.findings.reasons import reason_texts as _reason_texts
-from stepdiag.findings.undetermined import undetermined_text as _undetermined_text
-from stepdiag.findings.unseen import unseen_texts as _unseen_texts
+from stepdiag.findings.refusals import attach as _attach_refusals
 from stepdiag.io.displays import attach as _attach_displays
 from stepdiag.io.methods import attach as _attach_files
 from stepdiag.wrong_arguments import wrong_arguments as _wrong_arguments
@@ -169,18 +163,10 @@ _MODULE_OF = {name: module for module, names in _LATER.items() for name in names
 _MODULES = ("live", "methods", "montecarlo", "optics", "positions", "results")
 
 
-def _unseen_faults(faults: list[_UnseenFault], calibration: Calibration) -> list[str]:
-    from stepdiag.calibration.largest_by_kind import largest_uncertainties  # numpy, for which an import does not wait
-
-    return _unseen_texts(faults, {kind: u for kind, (u, _) in largest_uncertainties(calibration).items()})
-
-
 _attach_files()
 _attach_displays()
 _attach_figures()
-_word_findings_with(_undetermined_text)  # the extension's findings are worded here
-_word_reasons_with(_reason_texts)
-_word_unseen_faults_with(_unseen_faults)
+_attach_refusals()
 _word_wrong_arguments_with(_wrong_arguments)
 
 

@@ -11,12 +11,11 @@ from stepdiag._core import (
     ReadingUncertainty,
     SetupPriors,
     Smoothness,
-    adjust,
     diagonal_errors,
-    evaluate,
     recheck,
     verify,
 )
+from stepdiag.calibration.evaluations import adjust, evaluate
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.calibration.volume import volume_grid
 from stepdiag.planning.observation import extents

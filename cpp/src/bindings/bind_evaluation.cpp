@@ -1,5 +1,4 @@
 #include "bindings.hpp"
-#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/evaluation/constant_index.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
@@ -16,6 +15,7 @@ std::vector<std::string> names_of() {
     return names;
 }
 
+// By a linear method; the adjustment has a function of its own.
 Calibration evaluate(const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
                      const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
                      bool full_covariance, const PlausibleLimits& plausible,
@@ -23,27 +23,14 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
                            : method == "conventional" ? &evaluate_conventional
                                                       : nullptr;
-    if (!evaluator && method != "adjustment")
+    if (!evaluator)
         throw InvalidArgument("method: expected \"conventional\", \"enhanced\" or \"adjustment\", got \"" + method +
                               "\"");
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
-    const auto without_lock = [](auto&& evaluation) {
-        const py::gil_scoped_release release;
-        return evaluation();
-    };
-    if (evaluator)
-        return without_lock([&] {
-            return evaluator(measurement, plan, kinematics, offset, heads,
-                             {uncertainty, full_covariance, plausible, expansion});
-        });
-    AdjustmentOptions options;
-    options.uncertainty = uncertainty;
-    options.full_covariance = full_covariance;
-    options.plausible = plausible;
-    options.expansion = expansion;
-    return without_lock([&] { return adjust(measurement, plan, kinematics, offset, heads, options).calibration; });
+    const py::gil_scoped_release release;
+    return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible, expansion});
 }
 
 void bind_undetermined(py::module_& m) {
@@ -271,13 +258,10 @@ void bind_evaluation(py::module_& m) {
         "that the run's channels air_temperature, air_pressure and air_humidity recorded. Raises InvalidArgument for a "
         "run without any of them, a quantity that nothing states, and air out of the equation's range.");
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
-          py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "adjustment",
-          py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,
-          py::arg("plausible") = PlausibleLimits{}, py::arg("expansion") = std::nullopt,
-          "Calibration from a run. Of the head only its calibration is used, of the machine only chain "
-          "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, "
-          "for a result that is not plausible, and for a pass without temperatures where an expansion is "
-          "given.");
+          py::arg("tool") = zeros(3), py::kw_only(), py::arg("method"), py::arg("uncertainty") = ReadingUncertainty{},
+          py::arg("full_covariance") = false, py::arg("plausible") = PlausibleLimits{},
+          py::arg("expansion") = std::nullopt,
+          "Calibration from a run by a linear method; findings are data, methods.evaluate gives them in words, too.");
 }
 
 }  // namespace stepdiag::bindings

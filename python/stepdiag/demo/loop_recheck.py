@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Calibration, Head, KnownExpansion, Measurement, adjust
+from stepdiag._core import Calibration, Head, KnownExpansion, Measurement
+from stepdiag.calibration.evaluations import adjust
 from stepdiag.parameters import kind_of
 from stepdiag.scenario.known import Known
 

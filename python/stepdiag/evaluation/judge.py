@@ -20,6 +20,7 @@ from stepdiag.scenario.description import (
     Scenario,
     adjust_scenario,
     evaluate_beside_adjustment,
+    with_mistake,
 )
 from stepdiag.scenario.known import Known
 from stepdiag.wrong_arguments import checked
@@ -140,7 +141,9 @@ def judge(
         mistakes = search.after(adjusted)
     is_corrected = adjusted is not None and adjusted.verdict.fit == "accepted"
     if mistakes and not (mistakes[0].or_faults and is_corrected):
-        result = result.with_mistake(mistake_text(mistakes))
+        text = mistake_text(mistakes)
+        is_linear = isinstance(result, JudgedEvaluation)
+        result = result.with_mistake(text) if is_linear else with_mistake(result, text)
     return Judgement(result, tuple(mistakes))
 
 

@@ -89,6 +89,7 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         date=calibration.date,
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
+        fit_codes=calibration.fit_codes,
         fit_reasons=calibration.fit_reasons,
         unseen_faults=calibration.unseen_faults,
         conditions=calibration.conditions,

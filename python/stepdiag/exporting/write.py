@@ -66,6 +66,7 @@ def read_what_is_exported(path: Path) -> Calibration:
         date=calibration.date,
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
+        fit_codes=calibration.fit_codes,
         fit_reasons=calibration.fit_reasons,
         unseen_faults=calibration.unseen_faults,
         conditions=calibration.conditions,

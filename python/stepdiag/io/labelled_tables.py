@@ -155,6 +155,7 @@ def _attributes(calibration: Calibration) -> dict[str, Any]:
         attributes["fixed_point_mm"] = calibration.fixed_point
     return {
         **attributes,
+        "fit_codes": " ".join(calibration.fit_codes),
         "fit_reasons": "\n".join(calibration.fit_reasons),
         "unseen_faults": "\n".join(calibration.unseen_faults),
         "conditions": "\n".join(calibration.conditions),

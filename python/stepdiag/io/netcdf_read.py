@@ -90,6 +90,7 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             "unverified": not file.has_checksum or bool(file.text("unverified", "")),
             "fit": file.text("fit", "") or None,
             "variance_factor": file.number("variance_factor"),
+            "fit_codes": file.text("fit_codes", "").split(),
             "fit_reasons": list(filter(None, file.text("fit_reasons", "").split("\n"))),
             "unseen_faults": list(filter(None, file.text("unseen_faults", "").split("\n"))),
             "conditions": list(filter(None, file.text("conditions", "").split("\n"))),

@@ -94,7 +94,9 @@ class Judged:
         if self.is_explained:
             return updated
         reason = "recheck: no change of low order explains the readings"
-        return updated.judged("rejected", [*updated.fit_reasons, reason])
+        has_codes = len(updated.fit_codes) == len(updated.fit_reasons)  # a file of an older version has none
+        codes = [*updated.fit_codes, "recheck_unexplained"] if has_codes else []
+        return updated.judged("rejected", [*updated.fit_reasons, reason], codes)
 
     @cached_property
     def hidden(self) -> float:

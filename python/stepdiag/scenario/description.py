@@ -14,6 +14,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.evaluations import adjust, evaluate, in_words
 from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
@@ -143,14 +144,14 @@ def evaluate_scenario(
         return adjustment.calibration.with_between_nodes(known.between_nodes)
     implausible = implausible_inputs(known, measurement)
     found = _evaluated(known, measurement, method, full_covariance)
-    return _at_best_doubtful(found, found.fit or "unchecked", [], implausible)
+    return _judged(found, found.fit or "unchecked", [], implausible)
 
 
 def _evaluated(
     known: Known, measurement: _core.Measurement, method: Literal["conventional", "enhanced"], full_covariance: bool
 ) -> _core.Calibration:
     _check_memory(known, measurement, full_covariance)
-    found = _core.evaluate(
+    found = evaluate(
         _reduced(known, measurement),
         known.plan,
         of_run(known.heads),
@@ -171,12 +172,14 @@ def _words(calibration: _core.Calibration, known: Known, measurement: _core.Meas
     return conditions, budget_text(positioning_budget(calibration, known))
 
 
-def _at_best_doubtful(
-    calibration: _core.Calibration, fit: str, reasons: list[str], implausible: list[str]
+def _judged(
+    calibration: _core.Calibration, fit: str, reasons: list[tuple[str, str]], implausible: list[str]
 ) -> _core.Calibration:
-    if not reasons and not implausible:
-        return calibration
-    return calibration.judged(max(fit, "doubtful", key=FITS.index) if implausible else fit, reasons + implausible)
+    """With this verdict, at best doubtful where there are implausible inputs. `reasons`: code and sentence."""
+    if implausible:
+        fit = max(fit, "doubtful", key=FITS.index)
+        reasons = reasons + [("implausible_input", sentence) for sentence in implausible]
+    return calibration.judged(fit, [text for _, text in reasons], [code for code, _ in reasons])
 
 
 @dataclass(frozen=True)
@@ -194,11 +197,13 @@ class JudgedEvaluation:
 
     def with_mistake(self, mistake: str) -> "JudgedEvaluation":
         """The same, rejected because this mistake would explain the readings."""
-        reasons = [mistake_reason(mistake), *self.calibration.fit_reasons]
+        found = self.calibration
         return replace(
             self,
-            calibration=self.calibration.judged("rejected", reasons),
-            adjustment=self.adjustment and self.adjustment.with_mistake(mistake),
+            calibration=found.judged(
+                "rejected", [mistake_reason(mistake), *found.fit_reasons], ["mistake", *found.fit_codes]
+            ),
+            adjustment=self.adjustment and with_mistake(self.adjustment, mistake),
         )
 
 
@@ -221,15 +226,23 @@ def evaluate_beside_adjustment(
     except InvalidArgument as error:
         refusal = str(error)
     other = adjustment.verdict.fit if adjustment is not None else "unchecked"
-    reasons = [] if own == "accepted" else [f"the method {method} by itself: {MEANING[own]}"]
+    reasons = [] if own == "accepted" else [("method_by_itself", f"the method {method} by itself: {MEANING[own]}")]
     if refusal:
-        reasons.append(f"adjustment of the same readings: {' '.join(refusal.split())}")
+        reasons.append(("not_adjustable", f"adjustment of the same readings: {' '.join(refusal.split())}"))
     if adjustment is not None:
-        reasons += [f"adjustment of the same readings: {reason}" for reason in adjustment.calibration.fit_reasons]
-    worse = max(own, other, key=FITS.index)
+        found = adjustment.calibration
+        reasons += [
+            (code, f"adjustment of the same readings: {reason}")
+            for code, reason in zip(found.fit_codes, found.fit_reasons, strict=True)
+        ]
     return JudgedEvaluation(
-        _at_best_doubtful(calibration.judged(worse, reasons), worse, reasons, implausible), own, adjustment, refusal
+        _judged(calibration, max(own, other, key=FITS.index), reasons, implausible), own, adjustment, refusal
     )
+
+
+def with_mistake(adjustment: _core.Adjustment, mistake: str) -> _core.Adjustment:
+    """The same, rejected because this mistake would explain the readings."""
+    return in_words(_core.judge(adjustment, mistake=mistake))
 
 
 @checked
@@ -254,7 +267,7 @@ def adjust_scenario(
         reliability=reliability,
         search_faults=search_faults,
     )
-    return adjustment.with_implausible_inputs(implausible) if implausible else adjustment
+    return in_words(_core.judge(adjustment, implausible_inputs=implausible)) if implausible else adjustment
 
 
 def _adjusted(
@@ -266,7 +279,7 @@ def _adjusted(
     search_faults: bool = True,
 ) -> _core.Adjustment:
     _check_memory(known, measurement, full_covariance)
-    found = _core.adjust(
+    found = adjust(
         _reduced(known, measurement),
         known.plan,
         of_run(known.heads),
@@ -280,7 +293,7 @@ def _adjusted(
             search_faults=search_faults,
         ),
     )
-    return found.with_conditions(*_words(found.calibration, known, measurement))
+    return found.with_calibration(found.calibration.with_conditions(*_words(found.calibration, known, measurement)))
 
 
 def _check_memory(known: Known, measurement: _core.Measurement, full_covariance: bool) -> None:

@@ -69,7 +69,8 @@ void expect_spoiled(const std::function<void(Calibration&)>& spoil, const std::s
 
 TEST(Calibration, FileIsReadBackToTheSameBits) {
     const auto path = (folder / "stepdiag_calibration_test.csv").string();
-    const Calibration a = sample();
+    Calibration a = sample();
+    a.fit_codes = {"misfit", "trend"};
     write_calibration(a, path);
     const Calibration b = stepdiag::read_calibration(path);
     EXPECT_EQ(b.method, a.method);
@@ -78,6 +79,7 @@ TEST(Calibration, FileIsReadBackToTheSameBits) {
     EXPECT_EQ(b.volume, a.volume);
     EXPECT_EQ(b.tool, a.tool);
     EXPECT_EQ(b.undetermined, a.undetermined);
+    EXPECT_EQ(b.fit_codes, a.fit_codes);
     for (int i = 0; i < stepdiag::function_count; ++i) {
         ASSERT_EQ(b.functions[i].has_value(), a.functions[i].has_value()) << i;
         if (!a.functions[i]) continue;
@@ -170,6 +172,13 @@ TEST(CheckCalibration, PartsThatDoNotFitAreRefused) {
     expect_spoiled([](Calibration& c) { c.tool[1] = infinite; }, "tool");
     expect_spoiled([](Calibration& c) { c.date = "today\n"; }, "date");
     expect_spoiled([](Calibration& c) { c.undetermined = {"all\r"}; }, "undetermined");
+    expect_spoiled([](Calibration& c) { c.fit_codes = {"no misfit"}; }, "fit_codes");
+    expect_spoiled(
+        [](Calibration& c) {
+            c.fit_codes = {"misfit", "trend"};
+            c.fit_reasons = {"one"};
+        },
+        "fit_codes");
     expect_spoiled([](Calibration& c) { c.functions[0]->value.pop_back(); }, "EXX");
     expect_spoiled([](Calibration& c) { c.functions[0] = stepdiag::CalibratedFunction{}; }, "EXX");
     expect_spoiled([](Calibration& c) { c.functions[0]->position = {0.0, 0.0}; }, "EXX");
