@@ -323,7 +323,7 @@ def seeded(seed: Seed) -> Seeded | None:
     smaller = min(1.0, fault_detection.CERTAIN / root) if root > 0.0 else 0.0
     return Seeded(
         bool(adjusted.faults),
-        any(of.told_apart for of in adjusted.faults if fault.is_among(of.members)),
+        any(of.distinguished for of in adjusted.faults if fault.is_among(of.members)),
         determined(adjusted.calibration) != determined(sound.calibration),
         tuple(smaller * effect for effect in change(sound.calibration, wrong.calibration)),
     )
@@ -363,7 +363,7 @@ def faults(pool: multiprocessing.pool.Pool, count: int) -> bool:
             if control is None or control.count == 0 or control.found_from > LARGEST:
                 continue
             # Larger by a half than what is found, and told from all others, at 99 % of the worst place.
-            size = 1.5 * max(control.found_from, control.told_from)
+            size = 1.5 * max(control.found_from, control.distinguished_from)
             for is_scale, number in itertools.product((False, True), range(count)):
                 seeds.append(Seed(plan, kind, channel, is_scale, number, size, control.found_from))
     outcomes: dict[tuple[str, str, str, bool], list[Seeded]] = {}

@@ -347,7 +347,7 @@ void bind_result(py::module_& m) {
             "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\".")
         .def_readonly("corrected", &FaultClass::corrected,
                       "Whether the verdict is that of the fit after its treatment.")
-        .def_property_readonly("told_apart", &FaultClass::told_apart, "Whether the readings tell which one it was.")
+        .def_property_readonly("distinguished", &FaultClass::is_distinguished, "Whether the readings determine which one it was.")
         .def_readonly("widest", &FaultClass::widest,
                       "The parameter that estimated alternatives differ in most; empty where there are none.")
         .def_readonly("spread", &FaultClass::spread, "By how much they differ in it, mm or rad.")
@@ -428,7 +428,7 @@ void bind_result(py::module_& m) {
         m, "FaultControl",
         "Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found "
         "with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of "
-        "its size, and told from another one where that makes chi-square larger by 25. Twins are "
+        "its size, and distinguished from another one where that makes chi-square larger by 25. Twins are "
         "not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration "
         "differs.")
         .def_property_readonly(
@@ -439,8 +439,8 @@ void bind_result(py::module_& m) {
         .def_readonly("uncontrolled", &FaultControl::uncontrolled, "More of them, which no other reading controls.")
         .def_readonly("twins", &FaultControl::twins, "Those of `count` that have a twin.")
         .def_readonly("found_from", &FaultControl::found_from, "All of `count` are found from here on; mm or rad.")
-        .def_readonly("told_from", &FaultControl::told_from,
-                      "Those without a twin are told from all others from here on; mm or rad.")
+        .def_readonly("distinguished_from", &FaultControl::distinguished_from,
+                      "Those without a twin are distinguished from all others from this size on; mm or rad.")
         .def_property_readonly("hidden", by_family(&FaultControl::Effect::hidden),
                                "Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of "
                                "one that nothing controls.")

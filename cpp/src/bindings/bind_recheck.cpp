@@ -75,9 +75,9 @@ void bind_rechecking(py::module_& m) {
         .def_readonly("value", &ChangeTerm::value)
         .def_readonly("standard_uncertainty", &ChangeTerm::standard_uncertainty, "With the prior.")
         .def_readonly("prior", &ChangeTerm::prior, "Standard uncertainty with which it was known to be 0.")
-        .def_readonly("told", &ChangeTerm::told,
-                      "How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only in sums.");
-    py::class_<ChangeCombination>(m, "ChangeCombination", "A sum of changes, by their priors, that readings tell.")
+        .def_readonly("determined", &ChangeTerm::determined,
+                      "How much of it the readings determine, 0 to 1: near 1 by itself; in between only in sums.");
+    py::class_<ChangeCombination>(m, "ChangeCombination", "A sum of changes, by their priors, that readings determine.")
         .def_readonly("weight", &ChangeCombination::weight, "By term; the square sum is 1.")
         .def_readonly("value", &ChangeCombination::value, "In units of the priors.")
         .def_readonly("standard_uncertainty", &ChangeCombination::standard_uncertainty,
@@ -100,7 +100,7 @@ void bind_rechecking(py::module_& m) {
             "terms", [](const Recheck& r) { return to_tuple(r.terms); },
             "A ChangeTerm for each way in which the machine may change.")
         .def_property_readonly(
-            "combinations", [](const Recheck& r) { return to_tuple(r.combinations); }, "The best told first.")
+            "combinations", [](const Recheck& r) { return to_tuple(r.combinations); }, "The best determined first.")
         .def_property_readonly(
             "covariance", [](const Recheck& r) { return to_numpy(r.covariance); }, "(n, n) of the terms.")
         .def_property_readonly(

@@ -146,7 +146,8 @@ void bind_exception(py::module_& m) {
         try {
             if (thrown) std::rethrow_exception(thrown);
         } catch (const NothingDetermined& refusal) {
-            const py::object error = type(refusal.evaluation() + ": nothing can be determined");
+            const py::object& make = type;
+            const py::object error = make(refusal.evaluation() + ": nothing can be determined");
             if (!refusal.findings().empty()) error.attr("finding") = refusal.findings().front();
             PyErr_SetObject(type.ptr(), error.ptr());
         } catch (const InvalidArgument& error) {

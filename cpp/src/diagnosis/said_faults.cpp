@@ -82,7 +82,7 @@ std::vector<FaultClass> said_faults(const FaultContext& context, const FaultStat
         classes.push_back(std::move(entry));
     }
     // Several slips that are not distinguished may be other pairs than these: no class says so.
-    const auto is_doubtful = [&](const FaultClass& entry) { return !entry.told_apart() && !has_reading(entry); };
+    const auto is_doubtful = [&](const FaultClass& entry) { return !entry.is_distinguished() && !has_reading(entry); };
     if (std::count_if(classes.begin(), classes.end(), is_doubtful) > 1)
         for (FaultClass& entry : classes)
             if (is_doubtful(entry)) entry.corrected = false;

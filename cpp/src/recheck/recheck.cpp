@@ -90,7 +90,7 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
         ChangeTerm& term = result.terms[std::size_t(j)];
         term.value = prior[j] * changed.values()[begin + j];
         term.standard_uncertainty = std::sqrt(result.covariance(j, j));
-        term.told = strong.row(j).squaredNorm();
+        term.determined = strong.row(j).squaredNorm();
     }
     for (Eigen::Index k = count; k-- > told.first;) {
         ChangeCombination sum{{}, told.estimate[k], 1.0 / std::sqrt(told.information[k])};

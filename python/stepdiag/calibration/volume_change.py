@@ -13,7 +13,7 @@ from stepdiag.calibration.volume import Interval, VolumeErrors, volume, without_
 from stepdiag.display import Displayed, Facts
 from stepdiag.wrong_arguments import checked
 
-ChangeVerdict = Literal["improved", "worse", "cannot be told"]
+ChangeVerdict = Literal["improved", "worse", "undecided"]
 # Positions an axis, besides the nodes: the trapezoidal rule is then good to 1 % of the rms between rough nodes.
 _GRID: Final = 21
 
@@ -118,7 +118,7 @@ def _change(a: float, b: float, of_a: Interval | None, of_b: Interval | None, re
     if reason or of_a is None or of_b is None:
         return FigureChange(a, b, of_a, of_b, None, None)
     interval = difference_interval(a, b, of_a, of_b)
-    verdict: ChangeVerdict = "cannot be told"
+    verdict: ChangeVerdict = "undecided"
     if interval[1] < 0.0:
         verdict = "improved"
     elif interval[0] > 0.0:

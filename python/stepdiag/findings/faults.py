@@ -47,7 +47,7 @@ def _alternative(fault: Fault) -> str:
 
 
 def _doubt(found: FaultClass) -> str:
-    if found.told_apart:
+    if found.distinguished:
         return ""
     return "the readings do not distinguish them (stepdiag observe says which plan would)"
 
@@ -55,12 +55,12 @@ def _doubt(found: FaultClass) -> str:
 def _treatment(found: FaultClass) -> str:
     match found.treatment:
         case "left_out":
-            if found.told_apart:
+            if found.distinguished:
                 return "left out"
             if any(fault.kind == "slip" for fault in found.members):
                 return "the single readings among these are left out, which removes the slips, too"
             return "all of these readings are left out"
-        case "estimated" if found.told_apart:
+        case "estimated" if found.distinguished:
             return "its size is an unknown of the adjustment"
         case "estimated":
             return "the size is shared, and the spread of the alternatives is in the uncertainty"

@@ -24,7 +24,7 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
     yield f"  {'':<18}{'':>14}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
     for c in controls:
         cells = "".join(f"{_hidden(c, kind):>14}" for kind in KINDS)
-        yield f"  {name(c):<18}{_size(c, c.found_from):>14}{cells}  {told_apart(c)}"
+        yield f"  {name(c):<18}{_size(c, c.found_from):>14}{cells}  {distinguished(c)}"
     for c in controls:
         if c.uncontrolled:
             yield f"  {name(c)}: {c.uncontrolled} of {c.count + c.uncontrolled} that no other reading controls"
@@ -43,7 +43,7 @@ def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") ->
         if extension.trouble:
             yield f"  {extension.name}: {extension.trouble}"
             continue
-        said = "; ".join(f"{name(c)} {told_apart(c)}" for c in extension.controls)
+        said = "; ".join(f"{name(c)} {distinguished(c)}" for c in extension.controls)
         yield f"  {extension.name} ({extension.minutes:+.1f} minutes), distinguished: {said}"
 
 
@@ -52,12 +52,12 @@ def name(control: FaultControl) -> str:
     return FAULT_NAMES[control.kind, control.channel]
 
 
-def told_apart(control: FaultControl) -> str:
+def distinguished(control: FaultControl) -> str:
     """Which of the faults are, and from which size on."""
     if control.count == 0 or control.twins == control.count:
         return "none"
     share = "all" if control.twins == 0 else f"{100 * (control.count - control.twins) // control.count} %"
-    return f"{share} from {_size(control, control.told_from)}"
+    return f"{share} from {_size(control, control.distinguished_from)}"
 
 
 def _size(control: FaultControl, size: float) -> str:

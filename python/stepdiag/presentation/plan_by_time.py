@@ -21,7 +21,7 @@ from stepdiag.planning.plan_by_time import (
     says_more,
     untold,
 )
-from stepdiag.presentation.fault_control import name, told_apart
+from stepdiag.presentation.fault_control import name, distinguished
 from stepdiag.presentation.text_columns import text_columns
 from stepdiag.scenario.known import Known
 from stepdiag.units import MICROMETRE, MICRORADIAN
@@ -157,7 +157,7 @@ def fault_advice(taken: Outcome, telling: Outcome | None) -> Iterator[str]:
 
 
 def _told(one: Outcome) -> str:
-    return "; ".join(f"{name(c)} {told_apart(c)}" for c in one.faults or ()) or "none"
+    return "; ".join(f"{name(c)} {distinguished(c)}" for c in one.faults or ()) or "none"
 
 
 def _named(one: Outcome) -> str:

@@ -117,16 +117,16 @@ def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeError
         case "unchanged":
             yield f"no change of the machine is seen{without}: {tested}"
             yield from fault_rows(found.left_out)
-    told = [term for term in found.terms if term.told >= TOLD]
+    told = [term for term in found.terms if term.determined >= TOLD]
     if told:
         yield "changes that the readings determine one by one, U their expanded uncertainty (k = 2):"
         yield from text_columns([("parameter", "change", "", "U", ""), *map(_change_row, told)], left=(0, 2, 4))
-    together = [term for term in found.terms if UNTOLD < term.told < TOLD]
+    together = [term for term in found.terms if UNTOLD < term.determined < TOLD]
     if together:
         yield f"determined only together: {', '.join(f'{term.parameter} ({term.kind})' for term in together)}"
         sums = [text for one in found.combinations if (text := _sum_text(one, found.terms, together))]
         yield from (f"  {text}" for text in sums)
-    untold = [f"{term.parameter} ({term.kind})" for term in found.terms if term.told <= UNTOLD]
+    untold = [f"{term.parameter} ({term.kind})" for term in found.terms if term.determined <= UNTOLD]
     if untold:
         yield f"not determined: {', '.join(untold)}"
     yield (

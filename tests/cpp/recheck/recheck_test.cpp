@@ -53,7 +53,7 @@ TEST(Recheck, ChangedSquarenessIsFoundAndAttributed) {
     EXPECT_GT(found.fit_probability, 1e-3);
     const ChangeTerm& squareness = term(found, "C0Y");
     EXPECT_EQ(squareness.kind, ChangeKind::squareness);
-    EXPECT_GT(squareness.told, 0.9);
+    EXPECT_GT(squareness.determined, 0.9);
     EXPECT_NEAR(squareness.value, 40e-6, 4.0 * squareness.standard_uncertainty);
     EXPECT_LT(squareness.standard_uncertainty, 8e-6);
     const int c0y = 0;
@@ -69,7 +69,7 @@ TEST(Recheck, OneDiagonalTellsScalesAndSquarenessesTogetherOnly) {
     const Recheck found = rechecked(workshop, baseline, 2);
     EXPECT_LT(found.probability, 1e-3);
     for (const char* parameter : {"EXX", "EYY", "EZZ", "C0Y", "B0Z", "A0Z"})
-        EXPECT_LT(term(found, parameter).told, 0.9) << parameter;
+        EXPECT_LT(term(found, parameter).determined, 0.9) << parameter;
     EXPECT_FALSE(found.combinations.empty());
 }
 

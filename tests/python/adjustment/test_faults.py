@@ -57,7 +57,7 @@ def test_two_outliers_of_twenty_sigma_are_found_and_named(
     assert named >= set(places)
     for found in adjustment.faults:
         # Distances may have a partner that no other reading tells from them (below); tilts have none.
-        assert found.told_apart or {fault.channel for fault in found.members} == {"distance"}
+        assert found.distinguished or {fault.channel for fault in found.members} == {"distance"}
         for fault in found.members:
             place = (fault.row, fault.channel)
             assert (fault.run, fault.line, fault.point) == (
@@ -102,7 +102,7 @@ def test_distances_that_no_reading_tells_apart_are_both_left_out() -> None:
         sizes = np.sort(np.abs(adjust(bad, scenario, outlier_probability=0.0).normalised_residuals["distance"]))
         is_pair = bool(sizes[-2] > 0.99 * sizes[-1])
         assert len(found.members) == 1 + is_pair
-        assert found.told_apart == (not is_pair)
+        assert found.distinguished == (not is_pair)
         pairs += is_pair
     assert 0 < pairs < 8
 
@@ -309,7 +309,7 @@ def test_tilts_that_are_off_from_point_1_on_are_not_taken_for_a_wrong_first_one(
     (found,) = adjustment.faults
     assert (found.members[0].kind, found.members[0].line, found.members[0].point) == ("slip", line, 1)
     assert normalised(adjustment, table) < SOUND
-    if found.told_apart:
+    if found.distinguished:
         assert adjustment.verdict.fit == "rejected"
     else:  # both are unknowns, so that what they differ by is in the uncertainties
         assert [(fault.kind, fault.point) for fault in found.members] == [("slip", 1), ("reading", 0)]

@@ -105,7 +105,7 @@ def test_what_is_said_of_faults_is_what_adjustments_of_runs_with_them_show(text:
         assert control.twins == len(with_twin)
         assert control.shared == pytest.approx(shared, rel=1e-3, abs=1e-6)
         alone = [5.0 * u[i] / np.sqrt(1.0 - np.max(correlation[i] ** 2)) for i in own if i not in with_twin]
-        assert control.told_from == pytest.approx(max(alone, default=0.0), rel=1e-3)
+        assert control.distinguished_from == pytest.approx(max(alone, default=0.0), rel=1e-3)
 
 
 def test_standard_plan_tells_no_distance_from_its_twin_and_more_of_it_tells_all() -> None:

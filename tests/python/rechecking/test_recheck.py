@@ -122,7 +122,7 @@ def test_one_diagonal_tells_one_number_of_scales_and_squarenesses(folder: Path) 
     baseline = sd.read_calibration("calibration.nc")
     found = sd.recheck(baseline, sd.read_scenario("one.toml"), sd.read_measurement("one.csv"))
     lengths = [term.kind in ("scale", "squareness") for term in found.terms]
-    assert all(term.told < 0.9 for term, is_length in zip(found.terms, lengths, strict=True) if is_length)
+    assert all(term.determined < 0.9 for term, is_length in zip(found.terms, lengths, strict=True) if is_length)
     mostly = [sum(np.array(one.weight)[lengths] ** 2) > 0.5 for one in found.combinations]
     assert sum(mostly) == 1
 
@@ -135,7 +135,7 @@ def test_hidden_change_is_that_of_the_priors_where_nothing_is_told(folder: Path)
     plan = sd.Plan((400.0, 300.0, 250.0), ["p00"], 3)
     run = sd.simulate(sd.Machine(known.chain, sd.ErrorMap({}, {})), plan, sd.Head(), noise=sd.Noise(distance=1e-4))
     found = sd.methods.recheck(baseline, run, plan, sd.Head(), known.chain, priors=priors)
-    assert all(term.told < 0.1 for term in found.terms)
+    assert all(term.determined < 0.1 for term in found.terms)
     expected = 2.0 * 50e-6 * np.sqrt(300.0**2 + 2.0 * 250.0**2)
     assert Judged(found, baseline, 0.001).hidden == pytest.approx(expected, rel=1e-3)
 

@@ -117,7 +117,7 @@ struct FaultClass {
     double spread = 0.0;
     double plausible = 0.0;
 
-    bool told_apart() const { return members.size() == 1; }
+    bool is_distinguished() const { return members.size() == 1; }
 };
 
 // Why a fit is not accepted, or what its residuals have in common.
@@ -202,7 +202,7 @@ struct FaultControl {
     int uncontrolled = 0;     // more of them, which no other reading controls
     int twins = 0;            // those of `count` that have a twin
     double found_from = 0.0;  // all of `count` are found from this size on; mm or rad
-    double told_from = 0.0;   // those without a twin are told from all others from this size on
+    double distinguished_from = 0.0;   // those without a twin are told from all others from this size on
 
     // Largest of the calibrated values of one kind (mm or rad).
     struct Effect {

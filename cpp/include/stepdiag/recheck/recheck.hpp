@@ -40,11 +40,11 @@ struct ChangeTerm {
     double value;                 // in the unit of its prior
     double standard_uncertainty;  // with the prior
     double prior;
-    // How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only with others, in sums.
-    double told = 0.0;
+    // How much of it the readings determine, 0 to 1: near 1 by itself; in between only with others, in sums.
+    double determined = 0.0;
 };
 
-// A sum of changes that the readings tell: weight times change by its prior. The weights have the square sum 1.
+// A sum of changes that the readings determine: weight times change by its prior. The weights have the square sum 1.
 struct ChangeCombination {
     std::vector<double> weight;   // by term
     double value;                 // in units of the priors
@@ -63,7 +63,7 @@ struct Recheck {
     int fit_degrees_of_freedom;
     double fit_probability;
     std::vector<ChangeTerm> terms;
-    std::vector<ChangeCombination> combinations;  // the best told first
+    std::vector<ChangeCombination> combinations;  // the best determined first
     Eigen::MatrixXd covariance;                   // of the terms, with their priors
     Eigen::MatrixXd shape;                        // entry of the calibration x term: by a change of 1
     // The calibration with the change, and the covariance of both together. Its method names the date of the

@@ -65,7 +65,7 @@ class ChangedFigure(TypedDict):
     """B - A"""
     interval_um: list[float | None] | None
     """95 % of the change; null: not known"""
-    verdict: Literal["improved", "worse", "cannot be told"] | None
+    verdict: Literal["improved", "worse", "undecided"] | None
 
 
 class Effect(TypedDict):

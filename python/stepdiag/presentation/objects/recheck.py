@@ -192,7 +192,7 @@ def _misfit(found: PredictedReading, measurement: Measurement) -> Any:
 
 def _changes(terms: Sequence[ChangeTerm], kind: str, unit: str) -> Any:
     return [
-        {"parameter": term.parameter, "told": term.told}
+        {"parameter": term.parameter, "told": term.determined}
         | measured(unit, value=term.value, standard_uncertainty=term.standard_uncertainty, prior=term.prior)
         for term in terms
         if term.kind == kind
