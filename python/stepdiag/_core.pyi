@@ -11,11 +11,19 @@ import pandas
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_measurement', 'read_signals', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with', 'word_wrong_arguments_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'judge', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_measurement', 'read_signals', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_wrong_arguments_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
     """
+    @staticmethod
+    def __reduce__(error: InvalidArgument) -> tuple[type[InvalidArgument], tuple[str]]:
+        ...
+    @staticmethod
+    def __str__(error: InvalidArgument) -> str:
+        """
+        The message of an error. That of readings that determine nothing has a finding, which says why.
+        """
 class Environment:
     """
     The air around machine and head: a constant refractive index.
@@ -1279,7 +1287,7 @@ class Calibration:
             Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
             parameters that there are.
         """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], conditions: collections.abc.Sequence[str] = [], budget: str = '', between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None, unverified: bool = False) -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_codes: collections.abc.Sequence[str] = [], fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], conditions: collections.abc.Sequence[str] = [], budget: str = '', between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None, unverified: bool = False) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -1295,9 +1303,9 @@ class Calibration:
         """
         The same calibration with this date. Raises InvalidArgument for more than one line.
         """
-    def judged(self, fit: str, fit_reasons: collections.abc.Sequence[str] = []) -> Calibration:
+    def judged(self, fit: str, fit_reasons: collections.abc.Sequence[str] = [], fit_codes: collections.abc.Sequence[str] = []) -> Calibration:
         """
-        The same calibration with this verdict of its fit. Raises InvalidArgument for another word.
+        The same calibration with this verdict of its fit. Raises InvalidArgument for another word, and for reasons and codes that differ in number.
         """
     def plot(self, *, truth: ErrorMap | None = None) -> matplotlib.figure.Figure:
         """
@@ -1327,6 +1335,10 @@ class Calibration:
     def with_provenance(self, provenance: collections.abc.Mapping[str, str]) -> Calibration:
         """
         The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other keys, and for texts that are empty or of more than one line.
+        """
+    def with_sentences(self, *, undetermined: collections.abc.Sequence[str], fit_reasons: collections.abc.Sequence[str] = [], unseen_faults: collections.abc.Sequence[str] = []) -> Calibration:
+        """
+        The same calibration with its findings in these words. Raises InvalidArgument for a sentence of more than one line.
         """
     def write(self, path: str | os.PathLike[str], *, provenance: collections.abc.Mapping[str, str] | None = None, between_nodes: float | None = None) -> Calibration:
         """
@@ -1495,6 +1507,11 @@ class Calibration:
         Verdict of the fit: "accepted", "doubtful", "rejected" (not to be used) or "unchecked" (nothing controls the readings); None where it is not known.
         """
     @property
+    def fit_codes(self) -> list[str]:
+        """
+        Why that verdict, as stable codes: of an adjustment those of FitReason.finding; empty where it is not known.
+        """
+    @property
     def fit_reasons(self) -> list[str]:
         """
         Why that verdict, a sentence each.
@@ -1567,7 +1584,7 @@ class Calibration:
     @property
     def undetermined(self) -> list[str]:
         """
-        The findings in words; one sentence each.
+        The findings in words, one sentence each; empty until they are put in (with_sentences).
         """
     @property
     def undetermined_reversal_constants(self) -> list[str]:
@@ -2122,6 +2139,11 @@ class FaultClass:
         Whether the verdict is that of the fit after its treatment.
         """
     @property
+    def distinguished(self) -> bool:
+        """
+        Whether the readings determine which one it was.
+        """
+    @property
     def members(self) -> list[Fault]:
         """
         The best first.
@@ -2135,11 +2157,6 @@ class FaultClass:
     def spread(self) -> float:
         """
         By how much they differ in it, mm or rad.
-        """
-    @property
-    def told_apart(self) -> bool:
-        """
-        Whether the readings tell which one it was.
         """
     @property
     def treatment(self) -> str:
@@ -2277,7 +2294,7 @@ class KnownCombination:
         """
 class FaultControl:
     """
-    Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size, and told from another one where that makes chi-square larger by 25. Twins are not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration differs.
+    Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size, and distinguished from another one where that makes chi-square larger by 25. Twins are not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration differs.
     """
     def __repr__(self) -> str:
         ...
@@ -2292,6 +2309,11 @@ class FaultControl:
     def count(self) -> int:
         """
         Of controlled faults, one a place (of long runs: evenly spaced).
+        """
+    @property
+    def distinguished_from(self) -> float:
+        """
+        Those without a twin are distinguished from all others from this size on; mm or rad.
         """
     @property
     def found_from(self) -> float:
@@ -2312,11 +2334,6 @@ class FaultControl:
     def shared(self) -> dict[str, float]:
         """
         Kind of parameter -> by how much it differs, by the size of a fault, if its twin was it; in mm or rad each.
-        """
-    @property
-    def told_from(self) -> float:
-        """
-        Those without a twin are told from all others from here on; mm or rad.
         """
     @property
     def twins(self) -> int:
@@ -2365,17 +2382,9 @@ class Adjustment:
         ...
     def _repr_html_(self) -> str:
         ...
-    def with_conditions(self, conditions: collections.abc.Sequence[str], budget: str) -> Adjustment:
+    def with_calibration(self, calibration: Calibration) -> Adjustment:
         """
-        The same, with these words in the calibration.
-        """
-    def with_implausible_inputs(self, inputs: collections.abc.Sequence[str]) -> Adjustment:
-        """
-        The same, at best doubtful where there are inputs that no workshop has, a sentence each.
-        """
-    def with_mistake(self, mistake: str) -> Adjustment:
-        """
-        The same, rejected because this mistake would explain the readings.
+        The same, with this calibration: its own, with more words.
         """
     def write(self, path: str | os.PathLike[str], *, measurement: Measurement | None = None, provenance: collections.abc.Mapping[str, str] | None = None, between_nodes: float | None = None) -> Calibration:
         """
@@ -2530,6 +2539,11 @@ class ChangeTerm:
     def _repr_html_(self) -> str:
         ...
     @property
+    def determined(self) -> float:
+        """
+        How much of it the readings determine, 0 to 1: near 1 by itself; in between only in sums.
+        """
+    @property
     def kind(self) -> str:
         """
         "scale" (mm/mm), "bow" (mm, in the middle), "slope" (rad, from end to end) or "squareness" (rad).
@@ -2548,16 +2562,11 @@ class ChangeTerm:
         With the prior.
         """
     @property
-    def told(self) -> float:
-        """
-        How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only in sums.
-        """
-    @property
     def value(self) -> float:
         ...
 class ChangeCombination:
     """
-    A sum of changes, by their priors, that readings tell.
+    A sum of changes, by their priors, that readings determine.
     """
     def __repr__(self) -> str:
         ...
@@ -2622,7 +2631,7 @@ class Recheck:
     @property
     def combinations(self) -> tuple[ChangeCombination, ...]:
         """
-        The best told first.
+        The best determined first.
         """
     @property
     def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -3816,7 +3825,7 @@ class Compensator:
         ...
 def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, **kwargs: typing.Any) -> Adjustment:
     """
-    The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. The options are AdjustmentOptions, or its fields by name. Raises InvalidArgument.
+    The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. The options are AdjustmentOptions, or its fields by name. Findings are data; methods.adjust gives them in words, too. Raises InvalidArgument.
     """
 def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -3870,9 +3879,9 @@ def errors_at(machine: Machine, points: numpy.typing.ArrayLike) -> numpy.typing.
     """
     Error of the functional point (mm) and rotation vector of the tool (rad) at commanded points (n, 3), mm: (n, 6), exact, of axes that came in + direction.
     """
-def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None) -> Calibration:
+def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str, uncertainty: ReadingUncertainty = ..., full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None) -> Calibration:
     """
-    Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, for a result that is not plausible, and for a pass without temperatures where an expansion is given.
+    Calibration from a run by a linear method; findings are data, methods.evaluate gives them in words, too.
     """
 def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: typing.SupportsIndex = 0, counter: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -3897,6 +3906,10 @@ def instruction_set() -> str:
 def instruction_sets() -> list[str]:
     """
     Those that this processor has, fastest first.
+    """
+def judge(adjustment: Adjustment, *, mistake: str = '', implausible_inputs: collections.abc.Sequence[str] = []) -> Adjustment:
+    """
+    The same, rejected where a mistake would explain the readings; at best doubtful where there are inputs that no workshop has, a sentence each.
     """
 @typing.overload
 def locate(camera: Camera, image: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64] | None:
@@ -4015,18 +4028,6 @@ def with_covariance(calibration: Calibration, covariance: numpy.typing.ArrayLike
 def without_lost_marks(measurement: Measurement) -> Measurement:
     """
     The measurement without distances of 0 that stand for a lost beam, as read_measurement gives it. Raises InvalidArgument naming the row of another such mark.
-    """
-def word_findings_with(words: collections.abc.Callable[[Undetermined], str]) -> None:
-    """
-    Sets the function that makes a sentence of an Undetermined; the package does so.
-    """
-def word_reasons_with(words: collections.abc.Callable[[list[FitReason]], collections.abc.Sequence[str]]) -> None:
-    """
-    Sets the function that makes sentences of the reasons of a verdict; the package does so.
-    """
-def word_unseen_faults_with(words: collections.abc.Callable[[list[UnseenFault], Calibration], collections.abc.Sequence[str]]) -> None:
-    """
-    Sets the function that makes sentences of what faults may be unseen in a calibration; the package does so.
     """
 def word_wrong_arguments_with(words: typing.Any) -> None:
     """

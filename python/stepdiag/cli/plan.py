@@ -210,8 +210,8 @@ def plan(
     if choice.taken is not None:
         say(f"  {line_names(choice.taken)}")
         with Progress("plans that distinguish all faults"):
-            advice = telling(described, found, choice.taken, family)
-        for line in fault_advice(*advice):
+            extended = telling(described, found, choice.taken, family)
+        for line in fault_advice(*extended):
             say(line)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":

@@ -142,8 +142,7 @@ def judge(
     is_corrected = adjusted is not None and adjusted.verdict.fit == "accepted"
     if mistakes and not (mistakes[0].or_faults and is_corrected):
         text = mistake_text(mistakes)
-        is_linear = isinstance(result, JudgedEvaluation)
-        result = result.with_mistake(text) if is_linear else with_mistake(result, text)
+        result = result.with_mistake(text) if isinstance(result, JudgedEvaluation) else with_mistake(result, text)
     return Judgement(result, tuple(mistakes))
 
 

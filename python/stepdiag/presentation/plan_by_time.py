@@ -21,7 +21,7 @@ from stepdiag.planning.plan_by_time import (
     says_more,
     untold,
 )
-from stepdiag.presentation.fault_control import name, distinguished
+from stepdiag.presentation.fault_control import distinguished, name
 from stepdiag.presentation.text_columns import text_columns
 from stepdiag.scenario.known import Known
 from stepdiag.units import MICROMETRE, MICRORADIAN

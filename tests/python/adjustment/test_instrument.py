@@ -206,20 +206,20 @@ def test_file_and_object_have_conditions_and_budget(
     main(["evaluate", str(tmp_path / "s.toml"), str(tmp_path / "run.csv"), "-o", str(calibration), "--json"])
     found = json.loads(capsys.readouterr().out)
     conditions, budget = found["conditions"], found["budget"]
-    assert conditions["scales"][0] == {
-        "axis": "X",
-        "lowest_c": 23.0,
-        "highest_c": 23.0,
-        "origin": "column temperature_c",
-    }
-    assert conditions["expansion"]["u_expansion_um_per_m_k"] == [1.0] * 3
-    assert conditions["instrument"]["scale_ppm"] == 1.5
-    assert conditions["instrument"]["u_air_temperature_c"] is None
-    assert conditions["air_temperature_c"] is None
+    scale = conditions["scales"][0]
+    assert (scale["axis"], scale["temperature"]["value"], scale["origin"]) == (
+        "X",
+        [23.0, 23.0],
+        "column temperature_c",
+    )
+    assert conditions["expansion"]["coefficient"]["standard_uncertainty"] == [1.0] * 3
+    assert conditions["instrument"]["scale"] == {"value": 1.5, "unit": "ppm", "standard_uncertainty": 0.5}
+    assert conditions["instrument"]["u_air_temperature"]["reason"] == "not stated"
+    assert conditions["air_temperature"]["reason"] == "not recorded"
     assert budget["parameter"] == "EXX"
-    parts = [budget[f"{name}_um"] for name in ("noise", "scale", "temperature", "air")]
-    assert np.linalg.norm(parts) == pytest.approx(budget["standard_uncertainty_um"], rel=1e-9)
-    assert budget["scale_um"] == pytest.approx(0.4, rel=1e-3)
+    parts = [budget[name]["value"] for name in ("noise", "scale", "temperature", "air")]
+    assert np.linalg.norm(parts) == pytest.approx(budget["standard_uncertainty"]["value"], rel=1e-9)
+    assert budget["scale"]["value"] == pytest.approx(0.4, rel=1e-3)
     read = sd.read_calibration(calibration)
     assert read.conditions == found["calibration"]["conditions"]
     assert read.budget == found["calibration"]["budget"]

@@ -141,16 +141,14 @@ def test_object_of_readings_has_the_figures_of_the_result(here: Path, capsys: py
     assert own["figures"].keys() == result.figures.keys()
     for name, figure in result.figures.items():
         # The decimal point is moved exactly; multiplying rounds.
-        assert own["figures"][name]["value_um"] == pytest.approx(figure.value * 1e3, rel=1e-15)
-        assert own["figures"][name]["at_mm"] == list(figure.at)
-    assert [one["mean_um"] for one in own["up"]] == pytest.approx([s.mean * 1e3 for s in result.up], rel=1e-15)
+        assert own["figures"][name]["value"]["value"] == pytest.approx(figure.value * 1e3, rel=1e-15)
+        assert own["figures"][name]["at"]["value"] == list(figure.at)
+    assert [one["mean"]["value"] for one in own["up"]] == pytest.approx([s.mean * 1e3 for s in result.up], rel=1e-15)
     few = "target_mm,direction,cycle,deviation_um\n0,+,1,0\n0,+,2,1\n9,+,1,2\n9,+,2,0\n0,-,1,3\n"
     Path("few.csv").write_text(few)
     own = printed("positions", capsys, "positions", "few.csv")["measured"]
-    assert own["left_out"] == [
-        {"target_mm": 0.0, "direction": "-", "readings": 1},
-        {"target_mm": 9.0, "direction": "-", "readings": 0},
-    ]
+    left_out = [(one["target"]["value"], one["direction"], one["readings"]) for one in own["left_out"]]
+    assert left_out == [(0.0, "-", 1), (9.0, "-", 0)]
 
 
 def test_object_of_a_calibration_has_its_lines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -162,13 +160,13 @@ def test_object_of_a_calibration_has_its_lines(here: Path, capsys: pytest.Captur
     assert [line["name"] for line in found["predicted"]["lines"]] == ["X", "Y", "Z", "ppp", "npp", "pnp", "nnp"]
     expected = sd.positions.predict_positions(calibration, *sd.positions.axis_line(calibration, "X"))
     line = found["predicted"]["lines"][0]
-    assert line["up_um"] == pytest.approx((expected.up * 1e3).tolist(), rel=1e-15)
-    assert line["figures"]["B"]["value_um"] == pytest.approx(expected.figures["B"].value * 1e3, rel=1e-15)
+    assert line["up"]["value"] == pytest.approx((expected.up * 1e3).tolist(), rel=1e-15)
+    assert line["figures"]["B"]["value"]["value"] == pytest.approx(expected.figures["B"].value * 1e3, rel=1e-15)
     interval = expected.figures["E_up"].interval
     assert interval is not None
-    assert line["figures"]["E_up"]["interval_um"] == pytest.approx([end * 1e3 for end in interval], rel=1e-15)
+    assert line["figures"]["E_up"]["value"]["interval"] == pytest.approx([end * 1e3 for end in interval], rel=1e-15)
     diagonal = found["predicted"]["lines"][3]
-    assert diagonal["reversal_um"] == [None] * 6
+    assert diagonal["reversal"]["value"] == [None] * 6
     assert diagonal["reasons"]
     calibration.judged("rejected").write("bad.nc")
     assert len(printed("positions", capsys, "positions", "bad.nc", status=3)["warnings"]) == 1

@@ -57,13 +57,13 @@ def test_object_has_the_values_of_the_library(here: Path, capsys: pytest.Capture
         box=[[0, 10, 0], [80, 50, 50]],
         between_nodes=5e-4,
     )
-    assert content["largest_um"] == pytest.approx(found.largest * 1e3, rel=1e-15)
-    assert content["at_mm"] == found.largest_at.tolist()
+    assert content["largest"]["value"] == pytest.approx(found.largest * 1e3, rel=1e-15)
+    assert content["at"]["value"] == found.largest_at.tolist()
     assert content["verdict"] == found.verdict
-    assert content["between_nodes_um"] == 0.5
+    assert content["between_nodes"]["value"] == 0.5
     assert not content["between_nodes_estimated"]
     assert found.largest_interval is not None
-    assert content["interval_um"] == pytest.approx([end * 1e3 for end in found.largest_interval], rel=1e-12)
+    assert content["largest"]["interval"] == pytest.approx([end * 1e3 for end in found.largest_interval], rel=1e-12)
     assert len(content["ranking"]) == 24
 
 
@@ -91,13 +91,14 @@ def test_scenario_states_what_lies_between_the_nodes(
 
 def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     content = printed("volume", capsys, "volume", "c.csv", "--limit", "20")
-    assert content["interval_um"] is None
+    assert content["largest"]["interval"] is None
     assert content["verdict"] is None
     parts = parts_of(calibrate(1))
     del parts["functions"]["EXX"]
     sd.Calibration(**parts).write("m.csv")
     content = printed("volume", capsys, "volume", "m.csv")
-    assert content["largest_um"] is content["at_mm"] is content["ranges"]["X"]["value_um"] is None
+    for open_quantity in (content["largest"], content["at"], content["ranges"]["X"]):
+        assert (open_quantity["value"], open_quantity["reason"]) == (None, "not determined: EXX")
     assert content["missing"] == {"X": ["EXX"]}
     assert said(capsys, "m.csv")[1].startswith("not determined: EXX")
 

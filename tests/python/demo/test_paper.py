@@ -188,7 +188,11 @@ def test_commands_go_on_from_the_files_with_the_same_tables(demo: Path, case: st
         assert fit == "rejected" if method == "conventional" else method == "enhanced" or fit != "rejected"
         dated = (tmp_path / "out.csv").read_text().splitlines()
         # The command knows its files, and says of a linear method what the adjustment says too.
-        own = ["date", *sd.Calibration.provenance_keys(), *(["fit", "fit_codes", "fit_reasons"] if method != "adjustment" else [])]
+        own = [
+            "date",
+            *sd.Calibration.provenance_keys(),
+            *(["fit", "fit_codes", "fit_reasons"] if method != "adjustment" else []),
+        ]
         plain, made = (
             [line for line in lines if not line.startswith(tuple(f"# {key}=" for key in own))]
             for lines in (dated, (demo / case / f"{method}.csv").read_text().splitlines())

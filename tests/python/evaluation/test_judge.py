@@ -86,6 +86,7 @@ def expect_one_verdict(scenario: str, run: str, capsys: pytest.CaptureFixture[st
     evaluated = json.loads(capsys.readouterr().out)
     assert evaluated["fit"]["verdict"] == judged.fit
     written = sd.read_calibration("calibration.csv")
+    assert [reason["code"] for reason in evaluated["fit"]["reasons"]] == written.fit_codes
     assert written.fit == judged.fit
     assert written.fit_reasons == judged.reasons
 

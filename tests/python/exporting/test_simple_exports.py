@@ -326,14 +326,14 @@ def test_the_object_has_what_is_left_out_and_what_is_left(
     else:
         assert done.left is not None
         for key, size in (("without", done.left.without), ("with_it", done.left.with_it)):
-            assert said[key]["largest_um"] == pytest.approx(size.largest * 1e3, rel=1e-15)
-            assert said[key]["rms_um"] == pytest.approx(size.rms * 1e3, rel=1e-15)
-        assert said["without"]["largest_um"] == pytest.approx(
+            assert said[key]["largest"]["value"] == pytest.approx(size.largest * 1e3, rel=1e-15)
+            assert said[key]["rms"]["value"] == pytest.approx(size.rms * 1e3, rel=1e-15)
+        assert said["without"]["largest"]["value"] == pytest.approx(
             np.max(np.linalg.norm(machine_of(calibration).error(nodes(8)[0]), axis=1)) * 1e3, rel=1e-12
         )
     if to in ("matrix", "calibxyzkins"):
-        np.testing.assert_array_equal(said["linear"], done.values["linear"])
-    for key in ("squareness_urad", "fitted_squareness_urad", "with_fitted"):
+        np.testing.assert_array_equal([row["value"] for row in said["linear"]], done.values["linear"])
+    for key in ("squareness", "fitted_squareness", "with_fitted"):
         assert (said[key] is not None) == (to == "squareness")
     assert all((tmp_path / file).is_file() for file in said["files"])
 

@@ -55,7 +55,8 @@ def test_evaluate_has_it_as_an_object(folder: Path, capsys: pytest.CaptureFixtur
     assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv", "--json"]) == 3
     said = json.loads(capsys.readouterr().out)
     # Without the mistake it is doubtful.
-    assert said["fit"]["reasons"][0].startswith("a mistake explains the readings: alpha and beta are too large")
+    assert said["fit"]["reasons"][0]["code"] == "mistake"
+    assert said["fit"]["reasons"][0]["text"].startswith("a mistake explains the readings: alpha and beta are too large")
     (mistake,) = said["mistakes"]
     assert mistake["entry"] == "factor"
     assert mistake["fit"] == "accepted"

@@ -99,9 +99,11 @@ def test_object_has_what_the_report_has(folder: Path, capsys: pytest.CaptureFixt
     assert (result["changed"], result["explained"], result["updated"]) == (True, True, "updated.nc")
     assert result["chi_square"] == found.chi_square
     by_name = {term.parameter: term for term in found.terms}
-    assert result["squarenesses"][0]["value_urad"] == pytest.approx(1e6 * by_name["C0Y"].value)
-    assert {one["parameter"] for key in ("scales", "bows", "slopes", "squarenesses") for one in result[key]} == {
-        *by_name
+    (changed,) = [one for one in result["changes"] if one["parameter"] == "C0Y"]
+    assert changed["value"]["value"] == pytest.approx(1e6 * by_name["C0Y"].value)
+    assert changed["value"]["unit"] == "urad"
+    assert {(one["parameter"], one["kind"]) for one in result["changes"]} == {
+        (t.parameter, t.kind) for t in found.terms
     }
     assert len(result["sums"]) == found.degrees_of_freedom
 
@@ -191,7 +193,8 @@ def test_change_that_is_not_of_low_order_is_unexplained(folder: Path, capsys: py
     assert (result["verdict"], result["explained"], result["left_out"]) == ("unexplained", False, [])
     for one, row in zip(result["misfits"], rows, strict=True):
         assert f"line {one['line']}, run 0, point {one['point']}: " in row
-    times = [abs(one["deviation_um"]) / one["standard_uncertainty_um"] for one in result["misfits"]]
+    deviations = [one["deviation"] for one in result["misfits"]]
+    times = [abs(one["value"]) / one["standard_uncertainty"] for one in deviations]
     assert times == sorted(times, reverse=True)
 
 
@@ -215,7 +218,7 @@ def test_wrong_reading_is_named_and_left_out(folder: Path, capsys: pytest.Captur
     assert (result["verdict"], result["changed"], result["misfits"]) == ("unchanged", False, [])
     (fault,) = result["left_out"][0]["members"]
     assert (fault["row"], fault["kind"]) == (row, "reading")
-    assert abs(fault["size_um"] - 1e3 * wrong) < 5.0 * fault["standard_uncertainty_um"]
+    assert abs(fault["size"]["value"] - 1e3 * wrong) < 5.0 * fault["size"]["standard_uncertainty"]
 
 
 @pytest.mark.parametrize("layout", rechecked.LAYOUTS)

@@ -91,7 +91,7 @@ def test_object_has_what_the_report_has(files: Path, capsys: pytest.CaptureFixtu
     scenario = sd.read_scenario("tested.toml")
     found = sd.verify(sd.read_calibration("calibration.nc"), scenario, sd.read_measurement("new.csv"))
     assert result["chi_square"] == found.chi_square
-    assert [line["deviation_um"] for line in result["lines"]] == pytest.approx(
+    assert [line["deviation"]["value"] for line in result["lines"]] == pytest.approx(
         [1e3 * line.deviation for line in found.lines]
     )
 

@@ -151,7 +151,7 @@ def test_a_failure_ends_the_command_with_status_3(
 def test_object_has_the_rows_of_the_table(found: SelfTest, capsys: pytest.CaptureFixture[str]) -> None:
     said = printed("selftest", capsys, "selftest")
     assert said["passed"] is True
-    assert [(one["case"], one["compared"], one["allowed"]) for one in said["cases"]] == [
+    assert [(one["case"], one["compared"], one["allowed"]["value"]) for one in said["cases"]] == [
         (row.case, row.compared, row.allowed) for row in found.rows
     ]
     assert said["installation"]["sha256"] == found.installation.sha256
@@ -161,5 +161,5 @@ def test_object_of_a_failure(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     monkeypatch.setattr(cases, "CASES", (lambda known: 1 / 0,))
     said = printed("selftest", capsys, "selftest", status=3)
     assert said["passed"] is False
-    assert said["cases"][0]["deviation"] is None
+    assert said["cases"][0]["deviation"]["value"] is None
     assert "ZeroDivisionError" in said["cases"][0]["error"]

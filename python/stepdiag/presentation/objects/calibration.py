@@ -1,21 +1,25 @@
 """Parts of objects that describe a calibration: its fit, its tables, and the largest values of each kind."""
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Literal
 
-import numpy as np
-import numpy.typing as npt
 from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, Undetermined
 from stepdiag.calibration.largest_by_kind import largest_entries
 from stepdiag.findings.meaning import NOISE_ALONE
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES, Kind, units_of
-from stepdiag.presentation.objects.writer import in_unit, measured, number
+from stepdiag.presentation.quantity import Array, Quantities, Quantity, Unit, number, quantities, quantity, stated
 
-Array = npt.NDArray[np.float64]
 Tables = tuple[Array, Array, Array]  # positions, values, standard uncertainties
 Verdict = Literal["accepted", "doubtful", "rejected", "unchecked"]
+
+
+class Reason(TypedDict):
+    code: str | None
+    """Stable; null: the file of an earlier version, which has sentences alone."""
+    text: str
 
 
 class Fit(TypedDict):
@@ -24,8 +28,8 @@ class Fit(TypedDict):
 
     verdict: Verdict | None
     """Of the calibration, not of the machine; null: not known"""
-    reasons: list[str]
-    """Why that verdict, a sentence each."""
+    reasons: list[Reason]
+    """Why that verdict, the most important first."""
     variance_factor: float | None
     uncertainties_multiplied_by: float | None
     """What all standard uncertainties were multiplied by; null: by nothing."""
@@ -40,50 +44,33 @@ class Fit(TypedDict):
 class Temperature(TypedDict):
     """To which temperature positioning errors belong."""
 
-    temperature_reference_c: float | None
+    temperature_reference: Quantity
     """Positioning errors are referred to it; null: they are as found."""
-    temperature_as_found_c: list[float] | None
-    """Of the scales of X, Y, Z; null: not recorded, or referred to a temperature."""
+    temperature_as_found: Quantities
+    """Of the scales of X, Y, Z."""
 
 
-class _Function(TypedDict):
+class Function(TypedDict):
     parameter: str
     slope_determined: bool
-    """false: the shape alone is known, and both ends are 0."""
-    position_mm: list[float]
+    """false: the shape alone is known, and both ends are 0; or nothing is."""
+    position: Quantities
+    value: Quantities
+    """By position; null: not determined, with the reason."""
 
 
-class LengthFunction(_Function):
-    value_um: list[float | None]
-    standard_uncertainty_um: list[float | None]
-
-
-class AngleFunction(_Function):
-    value_urad: list[float | None]
-    standard_uncertainty_urad: list[float | None]
-
-
-class _Reversal(TypedDict):
+class Reversal(TypedDict):
     parameter: str
     constant_determined: bool
     """false: the change from home alone is known, and the value at home is 0."""
-    position_mm: list[float]
-
-
-class LengthReversal(_Reversal):
-    value_um: list[float | None]
-    standard_uncertainty_um: list[float | None]
-
-
-class AngleReversal(_Reversal):
-    value_urad: list[float | None]
-    standard_uncertainty_urad: list[float | None]
+    position: Quantities
+    value: Quantities
+    """Approached in + direction less in - direction."""
 
 
 class Squareness(TypedDict):
     parameter: Literal["C0Y", "B0Z", "A0Z"]
-    value_urad: float | None
-    standard_uncertainty_urad: float | None
+    value: Quantity
 
 
 class Setup(TypedDict):
@@ -100,15 +87,16 @@ class OpenFinding(TypedDict):
     """Error parameters; of a set-up its quantity."""
     component: int
     """Of a set-up's quantity, from 0."""
-    positions_mm: list[float]
+    positions: Quantities
     setups: list[Setup]
     reason: str
+    """Stable code."""
     remedies: list[str]
-    """The best first; any of them helps."""
+    """Stable codes, the best first; any of them helps."""
 
 
 class CalibrationTables(Temperature):
-    """The 21 parameters as far as they are determined."""
+    """The 21 parameters."""
 
     method: str
     date: str
@@ -116,18 +104,19 @@ class CalibrationTables(Temperature):
     provenance: dict[str, str]
     """By the keys of a calibration file: program, run_sha256, ..."""
     chain: str
-    volume_mm: list[float]
-    tool_mm: list[float]
+    volume: Quantities
+    tool: Quantities
     straightness_reference: str
-    expansion_um_per_m_k: list[float] | None
-    """Of the scales of X, Y, Z, by which they are referred; null: as found, or not known."""
-    fixed_point_mm: list[float] | None
+    expansion: Quantities
+    """Of the scales of X, Y, Z, by which positioning errors are referred."""
+    fixed_point: Quantities
     """Positions from which these scales expand."""
-    functions: list[LengthFunction | AngleFunction]
-    """Values by node; approached in + direction if there are reversal errors."""
-    reversal_errors: list[LengthReversal | AngleReversal]
-    """Approached in + direction less in - direction."""
+    functions: list[Function]
+    """All 18; approached in + direction if there are reversal errors."""
+    reversal_errors: list[Reversal]
+    """Those that are known."""
     squarenesses: list[Squareness]
+    """All three."""
     conditions: list[str]
     """Under which it was evaluated, as they were used, a sentence each; empty: not known."""
     budget: str
@@ -138,40 +127,27 @@ class CalibrationTables(Temperature):
     """The same as data; empty for a calibration that was read from a file."""
 
 
-class _Largest(TypedDict):
+class LargestValue(TypedDict):
     kind: Kind
     parameter: str
-    position_mm: float | None
+    position: Quantity
     """null: a squareness"""
+    value: Quantity
 
 
-class LargestLength(_Largest):
-    value_um: float
-
-
-class LargestAngle(_Largest):
-    value_urad: float
-
-
-class LeastKnownLength(_Largest):
-    standard_uncertainty_um: float
-
-
-class LeastKnownAngle(_Largest):
-    standard_uncertainty_urad: float
-
-
-def unit_key(parameter: str) -> str:
-    """The ending of keys with values of a parameter: um or urad."""
+def value_unit(parameter: str) -> Unit:
+    """The unit of a parameter's values: um or urad."""
     return "um" if units_of(parameter) == "mm" else "urad"
 
 
 def fit_of(calibration: Calibration) -> Fit:
     """The verdict that a calibration carries."""
     verdict: Any = calibration.fit
+    texts = calibration.fit_reasons
+    codes: Sequence[str | None] = calibration.fit_codes or [None] * len(texts)
     return {
         "verdict": verdict,
-        "reasons": list(calibration.fit_reasons),
+        "reasons": [{"code": code, "text": text} for code, text in zip(codes, texts, strict=True)],
         "variance_factor": number(calibration.variance_factor),
         "uncertainties_multiplied_by": number(calibration.uncertainty_scaled),
         "unseen_faults": list(calibration.unseen_faults),
@@ -182,32 +158,34 @@ def fit_of(calibration: Calibration) -> Fit:
 
 def temperature_of(calibration: Calibration) -> Temperature:
     """The temperature that a calibration carries."""
-    found = calibration.temperature_as_found
+    as_found = "positioning errors are referred to a temperature" if calibration.temperature_reference else "not known"
     return {
-        "temperature_reference_c": calibration.temperature_reference,
-        "temperature_as_found_c": None if found is None else found.tolist(),
+        "temperature_reference": stated("degC", calibration.temperature_reference, reason="as found"),
+        "temperature_as_found": quantities("degC", calibration.temperature_as_found, reason=as_found),
     }
 
 
 def tables_of(calibration: Calibration) -> CalibrationTables:
     """All values of a calibration, but for its covariance."""
-    slopes, constants = calibration.undetermined_slopes, calibration.undetermined_reversal_constants
-    found = calibration.expansion
-    expansion: Any = None if found is None else [in_unit("um_per_m_k", coefficient) for coefficient in found]
+    fixed_point = None if calibration.expansion is None else calibration.fixed_point
     return {
         "method": calibration.method,
         "date": calibration.date,
         "provenance": dict(calibration.provenance),
         "chain": calibration.chain.name,
-        "volume_mm": calibration.volume.tolist(),
-        "tool_mm": calibration.tool.tolist(),
+        "volume": quantities("mm", calibration.volume),
+        "tool": quantities("mm", calibration.tool),
         "straightness_reference": calibration.straightness_reference,
         **temperature_of(calibration),
-        "expansion_um_per_m_k": expansion,
-        "fixed_point_mm": None if calibration.expansion is None else calibration.fixed_point.tolist(),
-        "functions": _by_node(calibration.functions, "slope_determined", slopes),
-        "reversal_errors": _by_node(calibration.reversal, "constant_determined", constants),
-        "squarenesses": _squarenesses(calibration.squareness),
+        "expansion": quantities("um/(m K)", calibration.expansion),
+        "fixed_point": quantities("mm", fixed_point),
+        "functions": [_function(calibration, name) for name in FUNCTIONS],
+        "reversal_errors": [
+            _at_nodes(name, calibration.reversal, "constant_determined", calibration.undetermined_reversal_constants)
+            for name in FUNCTIONS
+            if name in calibration.reversal
+        ],
+        "squarenesses": [_squareness(calibration, name) for name in SQUARENESSES],
         "conditions": list(calibration.conditions),
         "budget": calibration.budget,
         "undetermined": list(calibration.undetermined),
@@ -215,25 +193,36 @@ def tables_of(calibration: Calibration) -> CalibrationTables:
     }
 
 
-def _by_node(tables: Mapping[str, Tables], known: str, unknown: Collection[str]) -> list[Any]:
-    return [
-        {
-            "parameter": name,
-            known: name not in unknown,
-            "position_mm": tables[name][0].tolist(),
-            **measured(unit_key(name), value=tables[name][1], standard_uncertainty=tables[name][2]),
-        }
-        for name in FUNCTIONS
-        if name in tables
-    ]
+def _function(calibration: Calibration, name: str) -> Any:
+    if name in calibration.functions:
+        return _at_nodes(name, calibration.functions, "slope_determined", calibration.undetermined_slopes)
+    return {
+        "parameter": name,
+        "slope_determined": False,
+        "position": quantities("mm", []),
+        "value": quantities(value_unit(name), None, reason=_why_open(calibration, name)),
+    }
 
 
-def _squarenesses(squareness: Mapping[str, tuple[float, float]]) -> list[Any]:
-    return [
-        {"parameter": name, **measured("urad", value=squareness[name][0], standard_uncertainty=squareness[name][1])}
-        for name in SQUARENESSES
-        if name in squareness
-    ]
+def _at_nodes(name: str, tables: Mapping[str, Tables], known: str, unknown: Collection[str]) -> Any:
+    position, value, u = tables[name]
+    return {
+        "parameter": name,
+        known: name not in unknown,
+        "position": quantities("mm", position),
+        "value": quantities(value_unit(name), value, u),
+    }
+
+
+def _squareness(calibration: Calibration, name: Any) -> Squareness:
+    value, u = calibration.squareness.get(name, (None, None))
+    return {"parameter": name, "value": quantity("urad", value, u, reason=_why_open(calibration, name))}
+
+
+def _why_open(calibration: Calibration, name: str) -> str:
+    """Why a calibration has no value of a parameter."""
+    about = (sentence for sentence in calibration.undetermined if re.search(rf"\b{name}\b", sentence))
+    return next(about, "not in the calibration")
 
 
 def findings_of(findings: Sequence[Undetermined], texts: Sequence[str]) -> list[OpenFinding]:
@@ -244,7 +233,7 @@ def findings_of(findings: Sequence[Undetermined], texts: Sequence[str]) -> list[
             "part": finding.part,
             "parameters": list(finding.parameters),
             "component": finding.component,
-            "positions_mm": list(finding.positions),
+            "positions": quantities("mm", finding.positions),
             "setups": [{"run": run, "line": line} for run, line in finding.setups],
             "reason": finding.reason,
             "remedies": list(finding.remedies),
@@ -254,15 +243,14 @@ def findings_of(findings: Sequence[Undetermined], texts: Sequence[str]) -> list[
     return found
 
 
-def largest_of(calibration: Calibration, *, uncertainty: bool = False) -> list[Any]:
-    """The largest value of each kind that has values, or its largest standard uncertainty."""
-    what = "standard_uncertainty" if uncertainty else "value"
+def largest_of(calibration: Calibration, *, uncertainty: bool = False) -> list[LargestValue]:
+    """The largest value of each kind that has values, or the value with the largest standard uncertainty."""
     return [
         {
             "kind": kind,
             "parameter": entry.parameter,
-            "position_mm": entry.position,
-            **measured(unit_key(entry.parameter), **{what: getattr(entry, what)}),
+            "position": quantity("mm", entry.position, reason="a squareness"),
+            "value": quantity(value_unit(entry.parameter), entry.value, entry.standard_uncertainty),
         }
         for kind, entry in largest_entries(calibration, uncertainty=uncertainty).items()
     ]

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import InvalidArgument, __version__
+from stepdiag._core import InvalidArgument
 from stepdiag.presentation.file_check import Finding
 from stepdiag.presentation.objects.calibration import Fit, fit_of
 from stepdiag.presentation.objects.evaluation import NamedMistake, mistake_of
+from stepdiag.presentation.objects.writer import Object, first_keys
 from stepdiag.presentation.scenario_and_run import FoundTogether
 
 
@@ -42,12 +42,9 @@ class CheckedRun(TypedDict):
     """What the report says."""
 
 
-class CheckObject(TypedDict):
+class CheckObject(Object):
     """Result of `stepdiag check`."""
 
-    stepdiag: str
-    format: Literal["stepdiag check 1"]
-    warnings: list[str]
     valid: bool
     """Whether all files are valid and belong together."""
     files: list[CheckedFile]
@@ -64,9 +61,7 @@ def check_object(
     checked = [_file(file, found) for file, found in files]
     with_scenario = [_run(run, str(scenario), found) for run, found in runs]
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag check 1",
-        "warnings": list(warnings),
+        **first_keys("check", warnings),
         "valid": all(one["valid"] for one in checked) and all(one["valid"] for one in with_scenario),
         "files": checked,
         "runs": with_scenario,

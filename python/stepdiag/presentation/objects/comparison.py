@@ -6,11 +6,12 @@ from typing import Any, Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import Calibration, __version__
+from stepdiag._core import Calibration
 from stepdiag.calibration import truth, volume_change
 from stepdiag.calibration.comparison import Comparison, Difference
-from stepdiag.presentation.objects.calibration import Fit, Temperature, fit_of, temperature_of, unit_key
-from stepdiag.presentation.objects.writer import in_unit, measured, number
+from stepdiag.presentation.objects.calibration import Fit, Temperature, fit_of, temperature_of, value_unit
+from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.quantity import Quantities, Quantity, number, quantities, quantity, with_interval
 
 
 class ComparedCalibration(Temperature):
@@ -19,11 +20,11 @@ class ComparedCalibration(Temperature):
     method: str
     date: str
     """ISO 8601, UTC; empty: not known"""
-    tool_mm: list[float]
+    tool: Quantities
     provenance: dict[str, str]
 
 
-class _ParameterDifference(TypedDict):
+class ParameterDifference(TypedDict):
     parameter: str
     """NAME_reversal: a reversal error"""
     shape_only: bool
@@ -37,34 +38,21 @@ class _ParameterDifference(TypedDict):
     """Index of the largest difference in the lists."""
     most_significant: int | None
     """Index of the largest normalised difference."""
-    position_mm: list[float | None]
+    position: Quantities
     """null: a squareness"""
+    difference: Quantities
+    """B - A"""
     normalised: list[float | None]
     """Differences by their standard uncertainties."""
-
-
-class LengthDifference(_ParameterDifference):
-    difference_um: list[float | None]
-    """B - A"""
-    standard_uncertainty_um: list[float | None]
-
-
-class AngleDifference(_ParameterDifference):
-    difference_urad: list[float | None]
-    """B - A"""
-    standard_uncertainty_urad: list[float | None]
 
 
 class ChangedFigure(TypedDict):
     """A figure of the error of the tool in the volume, by A and by B."""
 
-    a_um: float | None
-    """null: a parameter that acts in it is not determined"""
-    b_um: float | None
-    change_um: float | None
+    a: Quantity
+    b: Quantity
+    change: Quantity
     """B - A"""
-    interval_um: list[float | None] | None
-    """95 % of the change; null: not known"""
     verdict: Literal["improved", "worse", "undecided"] | None
 
 
@@ -72,8 +60,8 @@ class Effect(TypedDict):
     """The error of the tool in the volume that the difference of a parameter makes alone."""
 
     parameter: str
-    largest_um: float
-    rms_um: float
+    largest: Quantity
+    rms: Quantity
     significant: bool
 
 
@@ -103,16 +91,14 @@ class AgreementWithMap(TypedDict):
     """Of a larger chi-square, if the uncertainties are right."""
 
 
-class ComparisonObject(TypedDict):
+class ComparisonObject(Object):
     """Result of `stepdiag compare`."""
 
-    stepdiag: str
-    format: Literal["stepdiag comparison 1"]
-    warnings: list[str]
     a: ComparedCalibration
     b: ComparedCalibration
     chain: str
-    volume_mm: list[float]
+    size: Quantities
+    """Of the volume: edges along X, Y, Z"""
     limit: float
     """A difference is significant up to this probability."""
     values: int
@@ -124,7 +110,7 @@ class ComparisonObject(TypedDict):
     volume: ChangedVolume
     agreement: AgreementWithMap | None
     """null: both are calibrations"""
-    differences: list[LengthDifference | AngleDifference]
+    differences: list[ParameterDifference]
     only_in_a: list[str]
     only_in_b: list[str]
     notes: list[str]
@@ -136,13 +122,11 @@ def comparison_object(
     """How two calibrations, or a calibration and an error map, differ."""
     significant = filter(comparison.is_significant, comparison.differences)
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag comparison 1",
-        "warnings": list(warnings),
+        **first_keys("comparison", warnings),
         "a": _compared(comparison.a, files[0]),
         "b": _compared(comparison.b, files[1]),
         "chain": comparison.a.chain.name,
-        "volume_mm": comparison.a.volume.tolist(),
+        "size": quantities("mm", comparison.a.volume),
         "limit": comparison.limit,
         "values": comparison.count,
         "threshold": comparison.threshold if comparison.count else None,
@@ -168,20 +152,29 @@ def _compared(calibration: Calibration, file: Path) -> ComparedCalibration:
         "method": calibration.method,
         "date": calibration.date,
         **temperature_of(calibration),
-        "tool_mm": calibration.tool.tolist(),
+        "tool": quantities("mm", calibration.tool),
         "provenance": dict(calibration.provenance),
     }
 
 
-def _change(figure: volume_change.FigureChange) -> Any:
-    interval = None if figure.interval is None else [in_unit("um", end) for end in figure.interval]
-    values = measured("um", a=figure.a, b=figure.b, change=figure.change)
-    return {**values, "interval_um": interval, "verdict": figure.verdict}
+def _change(figure: volume_change.FigureChange) -> ChangedFigure:
+    open_because = "a parameter that acts in it is not determined"
+    verdict: Any = figure.verdict
+    return {
+        "a": quantity("um", figure.a, reason=open_because),
+        "b": quantity("um", figure.b, reason=open_because),
+        "change": with_interval("um", figure.change, figure.interval, reason=open_because),
+        "verdict": verdict,
+    }
 
 
-def _effect(effect: volume_change.ParameterEffect) -> Any:
-    values = measured("um", largest=effect.largest, rms=effect.rms)
-    return {"parameter": effect.parameter, **values, "significant": effect.significant}
+def _effect(effect: volume_change.ParameterEffect) -> Effect:
+    return {
+        "parameter": effect.parameter,
+        "largest": quantity("um", effect.largest),
+        "rms": quantity("um", effect.rms),
+        "significant": effect.significant,
+    }
 
 
 def _agreement(agreement: truth.TruthAgreement) -> AgreementWithMap:
@@ -204,7 +197,7 @@ def _difference(comparison: Comparison, one: Difference) -> Any:
         "probability": comparison.probability(one),
         "largest": one.largest,
         "most_significant": one.most_significant,
-        "position_mm": list(map(number, one.position.tolist())),
+        "position": quantities("mm", one.position),
+        "difference": quantities(value_unit(one.parameter), one.value, one.standard_uncertainty),
         "normalised": list(map(number, one.normalised.tolist())),
-        **measured(unit_key(one.parameter), difference=one.value, standard_uncertainty=one.standard_uncertainty),
     }

@@ -17,7 +17,6 @@ from stepdiag._core import (
     KnownCombination,
     Measurement,
     SetupEstimate,
-    __version__,
 )
 from stepdiag.findings.faults import fault_text
 from stepdiag.findings.mistakes import FoundMistake
@@ -25,17 +24,18 @@ from stepdiag.findings.undetermined import combination_text
 from stepdiag.presentation.objects.calibration import (
     CalibrationTables,
     Fit,
-    LeastKnownAngle,
-    LeastKnownLength,
+    LargestValue,
+    Setup,
     Verdict,
     fit_of,
     largest_of,
     tables_of,
-    unit_key,
+    value_unit,
 )
 from stepdiag.presentation.objects.conditions import PositioningParts, UsedConditions, budget_object, conditions_object
-from stepdiag.presentation.objects.writer import in_unit, measured, number
+from stepdiag.presentation.objects.writer import Object, first_keys
 from stepdiag.presentation.prior_effects import cosine_rows, drift_rows, rounding_rows
+from stepdiag.presentation.quantity import BY_KEY, Quantity, Unit, number, quantity
 from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -58,48 +58,19 @@ class Readings(TypedDict):
     """Points of the plan without a row."""
 
 
-class _SetupUnknown(TypedDict):
+class SetupUnknown(TypedDict):
     run: int
     """The first run that has this set-up."""
     line: str
     quantity: str
     component: int
     """From 0: about or along local x and y, or the beams d2, d3, ..."""
-
-
-class SetupLength(_SetupUnknown):
-    value_um: float | None
-    """null: not determined"""
-    standard_uncertainty_um: float | None
-    prior_um: float | None
+    value: Quantity
+    prior: Quantity
     """Standard uncertainty before the run; null: free."""
 
 
-class SetupOffset(_SetupUnknown):
-    value_mm: float | None
-    standard_uncertainty_mm: float | None
-    prior_mm: float | None
-
-
-class SetupAngle(_SetupUnknown):
-    value_urad: float | None
-    standard_uncertainty_urad: float | None
-    prior_urad: float | None
-
-
-class SetupShare(_SetupUnknown):
-    value_ppm: float | None
-    standard_uncertainty_ppm: float | None
-    prior_ppm: float | None
-
-
-class SetupRate(_SetupUnknown):
-    value_um_per_h: float | None
-    standard_uncertainty_um_per_h: float | None
-    prior_um_per_h: float | None
-
-
-class _Fault(TypedDict):
+class MemberFault(TypedDict):
     kind: Literal["reading", "slip", "factor"]
     channel: str
     run: int
@@ -108,25 +79,16 @@ class _Fault(TypedDict):
     row: int
     """Of the measurement, from 0."""
     chi_square_gain: float | None
-
-
-class LengthFault(_Fault):
-    size_um: float | None
-    standard_uncertainty_um: float | None
-
-
-class AngleFault(_Fault):
-    size_urad: float | None
-    standard_uncertainty_urad: float | None
+    size: Quantity
 
 
 class Faults(TypedDict):
-    """Faults of which the readings do not tell which one happened."""
+    """Faults of which the readings do not determine which one happened."""
 
     text: str
     treatment: Literal["left_out", "estimated", "none"]
-    told_apart: bool
-    members: list[LengthFault | AngleFault]
+    distinguished: bool
+    members: list[MemberFault]
     """The most likely first."""
 
 
@@ -136,61 +98,42 @@ class CombinedTerm(TypedDict):
     """An error parameter, whose slope is meant, or a quantity of a set-up."""
 
 
-class _Combination(TypedDict):
+class Combination(TypedDict):
     text: str
     terms: list[CombinedTerm]
-
-
-class SlopeCombination(_Combination):
-    value_um_per_m: float | None
-    standard_uncertainty_um_per_m: float | None
-
-
-class SetupCombination(_Combination):
-    run: int
-    line: str
+    setup: Setup | None
+    """null: a sum of slopes"""
     component: int
-    value_urad: float | None
-    standard_uncertainty_urad: float | None
+    """Of a set-up."""
+    value: Quantity
 
 
-class SmoothLength(TypedDict):
+class Smooth(TypedDict):
     parameter: str
-    second_difference_um: float | None
+    second_difference: Quantity
     """Standard deviation of second differences."""
 
 
-class SmoothAngle(TypedDict):
-    parameter: str
-    second_difference_urad: float | None
-
-
 class ByKind(TypedDict):
-    positioning_um: float | None
-    straightness_um: float | None
-    angle_urad: float | None
-    squareness_urad: float | None
+    positioning: Quantity
+    straightness: Quantity
+    angle: Quantity
+    squareness: Quantity
 
 
-class _Control(TypedDict):
+class Control(TypedDict):
+    """Which faults of one kind the readings control."""
+
     fault: Literal["reading", "slip", "factor"]
     channel: Literal["distance", "tilt", "spot"]
     controlled: int
     uncontrolled: int
     twins: int
-    """Of the controlled ones, those that are not told from another one at any size."""
+    """Of the controlled ones, those that are not distinguished from another one at any size."""
     hidden: ByKind
     """Largest effect of a fault just not found; null: not limited."""
-
-
-class LengthControl(_Control):
-    found_from_um: float | None
-    told_from_um: float | None
-
-
-class AngleControl(_Control):
-    found_from_urad: float | None
-    told_from_urad: float | None
+    found_from: Quantity
+    distinguished_from: Quantity
 
 
 class FoundExpansion(TypedDict):
@@ -198,30 +141,18 @@ class FoundExpansion(TypedDict):
 
     axes: list[str]
     """That have it in common."""
-    value_um_per_m_k: float | None
-    standard_uncertainty_um_per_m_k: float | None
-    stated_um_per_m_k: float | None
-    prior_um_per_m_k: float | None
-    """Standard uncertainty before the run."""
+    value: Quantity
+    stated: Quantity
+    """Before the run."""
 
 
-class FoundDriftByTime(TypedDict):
-    """A drift of the functional point, which was an unknown."""
+class FoundDrift(TypedDict):
+    """A drift of the functional point, which was an unknown: by time, or with a recorded temperature."""
 
     axis: str
-    value_um_per_h: float | None
-    standard_uncertainty_um_per_h: float | None
-    prior_um_per_h: float | None
+    value: Quantity
+    prior: Quantity
     """Standard uncertainty before the run."""
-
-
-class FoundDriftByTemperature(TypedDict):
-    """The same, with a recorded temperature."""
-
-    axis: str
-    value_um_per_k: float | None
-    standard_uncertainty_um_per_k: float | None
-    prior_um_per_k: float | None
 
 
 class AdjustmentPart(TypedDict):
@@ -231,14 +162,14 @@ class AdjustmentPart(TypedDict):
     weighted_square_sum: float | None
     chi_square_probability: float | None
     iterations: int
-    setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
+    setup: list[SetupUnknown]
     expansion: list[FoundExpansion]
-    machine_drift: list[FoundDriftByTime | FoundDriftByTemperature]
+    machine_drift: list[FoundDrift]
     faults: list[Faults]
-    combinations: list[SlopeCombination | SetupCombination]
+    combinations: list[Combination]
     """What is known of unknowns that are not determined one by one."""
-    smoothness: list[SmoothLength | SmoothAngle]
-    reliability: list[LengthControl | AngleControl]
+    smoothness: list[Smooth]
+    reliability: list[Control]
     """Which faults would have been found; empty without --reliability."""
 
 
@@ -266,20 +197,17 @@ class NamedMistake(TypedDict):
     """Of the first of a list: whether the faults that were found explain as much."""
 
 
-class EvaluationObject(TypedDict):
+class EvaluationObject(Object):
     """Result of `stepdiag evaluate`."""
 
-    stepdiag: str
-    format: Literal["stepdiag evaluation 1"]
     fit: Fit
     mistakes: list[NamedMistake]
-    """Of which one would explain a fit that is not accepted; several: the readings do not tell which."""
-    warnings: list[str]
+    """Of which one would explain a fit that is not accepted; several: the readings do not distinguish them."""
     files: EvaluatedFiles
     readings: Readings
     conditions: UsedConditions
     calibration: CalibrationTables
-    largest_standard_uncertainties: list[LeastKnownLength | LeastKnownAngle]
+    largest_standard_uncertainties: list[LargestValue]
     budget: PositioningParts | None
     """null: no positioning error is determined"""
     adjustment: AdjustmentPart | None
@@ -301,11 +229,9 @@ def evaluation_object(
 ) -> EvaluationObject:
     """What an evaluation found. `written`: its calibration with the date and provenance of its file."""
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag evaluation 1",
+        **first_keys("evaluation", warnings),
         "fit": fit_of(written),
         "mistakes": [mistake_of(found) for found in mistakes],
-        "warnings": list(warnings),
         "files": files,
         "readings": readings_of(measurement, known),
         "conditions": conditions_object(known, measurement),
@@ -342,10 +268,8 @@ def evaluated_files(scenario: Path, run: Path, calibration: Path) -> EvaluatedFi
 def _expansion(found: ExpansionEstimate) -> FoundExpansion:
     return {
         "axes": ["XYZ"[axis] for axis in found.axes],
-        "value_um_per_m_k": in_unit("um_per_m_k", found.value),
-        "standard_uncertainty_um_per_m_k": in_unit("um_per_m_k", found.standard_uncertainty),
-        "stated_um_per_m_k": in_unit("um_per_m_k", found.stated),
-        "prior_um_per_m_k": in_unit("um_per_m_k", found.prior),
+        "value": quantity("um/(m K)", found.value, found.standard_uncertainty),
+        "stated": quantity("um/(m K)", found.stated, found.prior),
     }
 
 
@@ -360,38 +284,33 @@ def readings_of(measurement: Measurement, known: Known) -> Readings:
     }
 
 
-def setup_of(estimates: Iterable[SetupEstimate]) -> list[Any]:
+def setup_of(estimates: Iterable[SetupEstimate]) -> list[SetupUnknown]:
     """The unknowns of set-ups, those that a scenario fixes left out."""
-    return [
-        {
-            "run": unknown.run,
-            "line": unknown.line,
-            "quantity": unknown.quantity,
-            "component": unknown.component,
-            **measured(
-                SETUP_QUANTITIES[unknown.quantity].report_unit,
-                value=unknown.value,
-                standard_uncertainty=None if unknown.value is None else unknown.standard_uncertainty,
-                prior=unknown.prior,
-            ),
-        }
-        for unknown in estimates
-        if unknown.prior > 0.0
-    ]
+    return [_setup_unknown(unknown) for unknown in estimates if unknown.prior > 0.0]
 
 
-def combinations_of(combinations: Iterable[KnownCombination], *, value: bool = True) -> list[Any]:
+def _setup_unknown(unknown: SetupEstimate) -> SetupUnknown:
+    unit = BY_KEY[SETUP_QUANTITIES[unknown.quantity].report_unit]
+    u = None if unknown.value is None else unknown.standard_uncertainty
+    return {
+        "run": unknown.run,
+        "line": unknown.line,
+        "quantity": unknown.quantity,
+        "component": unknown.component,
+        "value": quantity(unit, unknown.value, u, reason="the readings do not determine it"),
+        "prior": quantity(unit, unknown.prior, reason="free"),
+    }
+
+
+def combinations_of(combinations: Iterable[KnownCombination], *, value: bool = True) -> list[Combination]:
     """Known combinations; without `value` the text has the standard uncertainty alone."""
     return [
         {
             "text": combination_text(known, value=value),
             "terms": [{"weight": weight, "name": name} for weight, name in known.terms],
-            **({"run": known.run, "line": known.line, "component": known.component} if known.line else {}),
-            **measured(
-                "urad" if known.line else "um_per_m",
-                value=known.value,
-                standard_uncertainty=known.standard_uncertainty,
-            ),
+            "setup": {"run": known.run, "line": known.line} if known.line else None,
+            "component": known.component,
+            "value": quantity("urad" if known.line else "um/m", known.value, known.standard_uncertainty),
         }
         for known in combinations
     ]
@@ -399,38 +318,42 @@ def combinations_of(combinations: Iterable[KnownCombination], *, value: bool = T
 
 def reliability_of(controls: Iterable[FaultControl]) -> list[Any]:
     """Which faults the readings control."""
-    return [
-        {
-            "fault": control.kind,
-            "channel": control.channel,
-            "controlled": control.count,
-            "uncontrolled": control.uncontrolled,
-            "twins": control.twins,
-            "hidden": by_kind(control.hidden),
-            **measured(
-                "urad" if control.channel == "tilt" else "um",
-                found_from=control.found_from if control.count else None,
-                told_from=control.told_from if control.count > control.twins else None,
-            ),
-        }
-        for control in controls
-    ]
+    return [_control(control, "urad" if control.channel == "tilt" else "um") for control in controls]
 
 
-def by_kind(native: Mapping[Any, float]) -> ByKind:
-    """One number for each kind of parameter; None where there is none or it is not finite."""
+def _control(control: FaultControl, unit: Unit) -> Any:
+    found = control.found_from if control.count else None
+    distinguished = control.distinguished_from if control.count > control.twins else None
     return {
-        "positioning_um": in_unit("um", native.get("positioning")),
-        "straightness_um": in_unit("um", native.get("straightness")),
-        "angle_urad": in_unit("urad", native.get("angle")),
-        "squareness_urad": in_unit("urad", native.get("squareness")),
+        "fault": control.kind,
+        "channel": control.channel,
+        "controlled": control.count,
+        "uncontrolled": control.uncontrolled,
+        "twins": control.twins,
+        "hidden": by_kind(control.hidden, reason="not limited"),
+        "found_from": quantity(unit, found, reason="none is controlled"),
+        "distinguished_from": quantity(unit, distinguished, reason="none is distinguished"),
     }
 
 
-def _machine_drift(found: DriftEstimate, known: Known) -> Any:
+def by_kind(native: Mapping[Any, float], *, reason: str) -> ByKind:
+    """One number for each kind of parameter; null where there is none or it is not finite."""
+    return {
+        "positioning": quantity("um", native.get("positioning"), reason=reason),
+        "straightness": quantity("um", native.get("straightness"), reason=reason),
+        "angle": quantity("urad", native.get("angle"), reason=reason),
+        "squareness": quantity("urad", native.get("squareness"), reason=reason),
+    }
+
+
+def _machine_drift(found: DriftEstimate, known: Known) -> FoundDrift:
     by_time = known.machine_drift is None or known.machine_drift.record == "time"
-    numbers = {"value": found.value, "standard_uncertainty": found.standard_uncertainty, "prior": found.prior}
-    return {"axis": "XYZ"[found.axis], **measured("um_per_h" if by_time else "um_per_k", **numbers)}
+    unit: Unit = "um/h" if by_time else "um/K"
+    return {
+        "axis": "XYZ"[found.axis],
+        "value": quantity(unit, found.value, found.standard_uncertainty),
+        "prior": quantity(unit, found.prior, reason="free"),
+    }
 
 
 def _adjustment(found: Adjustment, known: Known) -> AdjustmentPart:
@@ -449,9 +372,9 @@ def _adjustment(found: Adjustment, known: Known) -> AdjustmentPart:
     }
 
 
-def _smoothness(deviations: Mapping[str, float]) -> list[Any]:
+def _smoothness(deviations: Mapping[str, float]) -> list[Smooth]:
     return [
-        {"parameter": name, **measured(unit_key(name), second_difference=deviation)}
+        {"parameter": name, "second_difference": quantity(value_unit(name), deviation)}
         for name, deviation in deviations.items()
     ]
 
@@ -462,9 +385,14 @@ def faults_of(found: FaultClass) -> Faults:
     return {
         "text": fault_text(found),
         "treatment": treatment,
-        "told_apart": found.told_apart,
+        "distinguished": found.distinguished,
         "members": [_fault(fault) for fault in found.members],
     }
+
+
+def channel_unit(channel: str) -> Unit:
+    """The unit of a channel's deviations."""
+    return "urad" if channel in ("alpha", "beta") else "um"
 
 
 def _fault(fault: Fault) -> Any:
@@ -476,11 +404,7 @@ def _fault(fault: Fault) -> Any:
         "point": fault.point,
         "row": fault.row,
         "chi_square_gain": number(fault.chi_square_gain),
-        **measured(
-            "urad" if fault.channel in ("alpha", "beta") else "um",
-            size=fault.size,
-            standard_uncertainty=fault.standard_uncertainty,
-        ),
+        "size": quantity(channel_unit(fault.channel), fault.size, fault.standard_uncertainty),
     }
 
 

@@ -1,45 +1,35 @@
 """The object of `stepdiag observe --json`."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal
+from typing import Any
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import Adjustment, Measurement, __version__
+from stepdiag._core import Adjustment, Measurement
 from stepdiag.parameters import KINDS
 from stepdiag.planning.fault_control import Extension
 from stepdiag.planning.observation import Prospect, extents, growth
-from stepdiag.presentation.objects.calibration import (
-    LeastKnownAngle,
-    LeastKnownLength,
-    OpenFinding,
-    findings_of,
-    largest_of,
-)
+from stepdiag.presentation.objects.calibration import LargestValue, OpenFinding, findings_of, largest_of
 from stepdiag.presentation.objects.evaluation import (
-    AngleControl,
     ByKind,
-    LengthControl,
+    Combination,
+    Control,
     Readings,
-    SetupAngle,
-    SetupCombination,
-    SetupLength,
-    SetupOffset,
-    SetupRate,
-    SetupShare,
-    SlopeCombination,
+    SetupUnknown,
     by_kind,
     combinations_of,
     readings_of,
     reliability_of,
     setup_of,
 )
+from stepdiag.presentation.objects.writer import Object, first_keys
 from stepdiag.presentation.prior_effects import cosine_rows, drift_rows
+from stepdiag.presentation.quantity import Quantities, Quantity, quantities, stated
 from stepdiag.scenario.known import Known
 
 
 class ObservedPlan(TypedDict):
-    volume_mm: list[float]
+    volume: Quantities
     lines: list[str]
     scale_lines: list[str]
     scale_points: str
@@ -53,18 +43,18 @@ class ObservedPlan(TypedDict):
 class ExtendedPlan(TypedDict):
     name: str
     """What is added to the plan."""
-    longer_minutes: float
+    longer: Quantity
     """How much longer it takes."""
     trouble: str | None
     """Why there is no result."""
-    reliability: list[LengthControl | AngleControl]
+    reliability: list[Control]
 
 
 class StepsObject(TypedDict):
     """What a number of steps would give."""
 
     steps: int
-    mirror_mm: list[float]
+    mirror: Quantities
     """Width and height of the smallest mirror."""
     trouble: str | None
     """Why there is no result."""
@@ -80,12 +70,9 @@ class GrowthExponents(TypedDict):
     squareness: float | None
 
 
-class ObservationObject(TypedDict):
+class ObservationObject(Object):
     """Result of `stepdiag observe`: of a run without errors, so there is no verdict."""
 
-    stepdiag: str
-    format: Literal["stepdiag observation 1"]
-    warnings: list[str]
     scenario: str
     plan: ObservedPlan
     readings: Readings
@@ -99,12 +86,12 @@ class ObservationObject(TypedDict):
     """A sentence each."""
     findings: list[OpenFinding]
     """The same as data."""
-    combinations: list[SlopeCombination | SetupCombination]
+    combinations: list[Combination]
     """What is known of unknowns that are not determined one by one. All values are 0."""
-    largest_standard_uncertainties: list[LeastKnownLength | LeastKnownAngle]
-    setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
+    largest_standard_uncertainties: list[LargestValue]
+    setup: list[SetupUnknown]
     """Values are 0."""
-    reliability: list[LengthControl | AngleControl]
+    reliability: list[Control]
     """Which faults of the readings would be found and distinguished."""
     extensions: list[ExtendedPlan]
     """Plans with more in them; empty if the plan distinguishes all faults."""
@@ -121,12 +108,10 @@ def observation_object(
     whole, shapes, parts = extents(calibration, plan)
     exponents: Any = {kind: growth(table, kind) for kind in KINDS}
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag observation 1",
-        "warnings": [],
+        **first_keys("observation", []),
         "scenario": str(known.path),
         "plan": {
-            "volume_mm": plan.volume.tolist(),
+            "volume": quantities("mm", plan.volume),
             "lines": list(plan.lines),
             "scale_lines": list(plan.scale_lines),
             "scale_points": plan.scale_points,
@@ -148,7 +133,7 @@ def observation_object(
         "extensions": [
             {
                 "name": extension.name,
-                "longer_minutes": extension.minutes,
+                "longer": stated("min", extension.minutes),
                 "trouble": extension.trouble or None,
                 "reliability": reliability_of(extension.controls),
             }
@@ -157,9 +142,9 @@ def observation_object(
         "by_steps": [
             {
                 "steps": prospect.steps,
-                "mirror_mm": list(prospect.mirror),
+                "mirror": quantities("mm", prospect.mirror),
                 "trouble": prospect.trouble or None,
-                "largest_standard_uncertainty": by_kind(prospect.largest),
+                "largest_standard_uncertainty": by_kind(prospect.largest, reason="none is determined"),
             }
             for prospect in table
         ],

@@ -6,44 +6,42 @@ from typing import Any, Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import Calibration, __version__
+from stepdiag._core import Calibration
 from stepdiag.positions.evaluation import MeasuredPositions, TargetScatter
 from stepdiag.positions.figures import PositionFigure
 from stepdiag.positions.prediction import PredictedPositions
 from stepdiag.presentation.objects.calibration import Fit, fit_of
-from stepdiag.presentation.objects.writer import in_unit, measured
+from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.quantity import Quantities, Quantity, quantities, quantity, with_interval
 
 
 class Figure(TypedDict):
-    value_um: float | None
-    at_mm: list[float]
+    value: Quantity
+    """Its standard uncertainty: measured, from the scatter of the readings alone; predicted, from the calibration."""
+    at: Quantities
     """Where it occurs: one target, or those of the highest and of the lowest value; empty for a mean."""
-    standard_uncertainty_um: float | None
-    """Measured: from the scatter of the readings alone. Predicted: from the calibration. null: not known."""
-    interval_um: list[float | None] | None
-    """95 %; null: not known"""
 
 
 class Scatter(TypedDict):
     """Deviations at a target that was approached in one direction."""
 
-    target_mm: float
-    mean_um: float | None
-    standard_deviation_um: float | None
+    target: Quantity
+    mean: Quantity
+    standard_deviation: Quantity
     """Sample standard deviation"""
     readings: int
 
 
 class LeftOut(TypedDict):
-    target_mm: float
+    target: Quantity
     direction: Literal["+", "-"]
     readings: int
 
 
-class Reversal(TypedDict):
-    target_mm: float
-    reversal_um: float | None
-    repeatability_um: float | None
+class TargetReversal(TypedDict):
+    target: Quantity
+    reversal: Quantity
+    repeatability: Quantity
 
 
 class Measured(TypedDict):
@@ -51,7 +49,7 @@ class Measured(TypedDict):
 
     line: str
     """What was measured, as the file says."""
-    targets_mm: list[float]
+    targets: Quantities
     cycles: list[int]
     readings: int
     lost: int
@@ -60,7 +58,7 @@ class Measured(TypedDict):
     up: list[Scatter]
     """Targets approached in + direction."""
     down: list[Scatter]
-    both: list[Reversal]
+    both: list[TargetReversal]
     left_out: list[LeftOut]
     """Targets with fewer than two readings in a direction."""
 
@@ -68,19 +66,17 @@ class Measured(TypedDict):
 class PredictedLine(TypedDict):
     name: str
     """An axis, a diagonal, or line"""
-    start_mm: list[float]
-    end_mm: list[float]
+    start: Quantities
+    end: Quantities
     figures: dict[str, Figure]
     """By symbol: E, E_up, E_down, M, B, B_mean, as far as they are known; systematic part."""
-    target_mm: list[float]
+    target: Quantities
     """Distance from the start."""
-    up_um: list[float | None]
+    up: Quantities
     """Deviations at the targets, approached from start to end."""
-    up_standard_uncertainty_um: list[float | None]
-    down_um: list[float | None]
-    """Approached from end to start; where reversal_um is null, known but for a constant."""
-    reversal_um: list[float | None]
-    reversal_standard_uncertainty_um: list[float | None]
+    down: Quantities
+    """Approached from end to start; where reversal is null, known but for a constant."""
+    reversal: Quantities
     reasons: list[str]
     """Why figures or intervals are missing."""
 
@@ -89,16 +85,13 @@ class Predicted(TypedDict):
     """Prediction from a calibration."""
 
     fit: Fit
-    tool_mm: list[float]
+    tool: Quantities
     lines: list[PredictedLine]
 
 
-class PositionsObject(TypedDict):
+class PositionsObject(Object):
     """Result of `stepdiag positions`."""
 
-    stepdiag: str
-    format: Literal["stepdiag positions 1"]
-    warnings: list[str]
     file: str
     measured: Measured | None
     """null: the file is a calibration"""
@@ -111,7 +104,7 @@ def measured_object(result: MeasuredPositions, file: Path, warnings: Sequence[st
     readings = result.readings
     own: Any = {
         "line": readings.line,
-        "targets_mm": list(readings.targets),
+        "targets": quantities("mm", readings.targets),
         "cycles": list(readings.cycles),
         "readings": len(readings.deviations),
         "lost": readings.lost,
@@ -119,11 +112,15 @@ def measured_object(result: MeasuredPositions, file: Path, warnings: Sequence[st
         "up": _scatters(result.up),
         "down": _scatters(result.down),
         "both": [
-            {"target_mm": target, **measured("um", reversal=reversal, repeatability=result.repeatability[target])}
+            {
+                "target": quantity("mm", target),
+                "reversal": quantity("um", reversal),
+                "repeatability": quantity("um", result.repeatability[target], reason="too few readings"),
+            }
             for target, reversal in result.reversal.items()
         ],
         "left_out": [
-            {"target_mm": target, "direction": direction, "readings": count}
+            {"target": quantity("mm", target), "direction": direction, "readings": count}
             for target, direction, count in result.left_out
         ],
     }
@@ -136,22 +133,17 @@ def predicted_object(
     """What a calibration predicts along lines."""
     own: Any = {
         "fit": fit_of(calibration),
-        "tool_mm": list(next(iter(lines.values())).tool),
+        "tool": quantities("mm", next(iter(lines.values())).tool),
         "lines": [
             {
                 "name": name,
-                "start_mm": list(line.start),
-                "end_mm": list(line.end),
+                "start": quantities("mm", line.start),
+                "end": quantities("mm", line.end),
                 "figures": _figures(line.figures),
-                "target_mm": line.target.tolist(),
-                **measured(
-                    "um",
-                    up=line.up,
-                    up_standard_uncertainty=line.up_standard_uncertainty,
-                    down=line.down,
-                    reversal=line.reversal,
-                    reversal_standard_uncertainty=line.reversal_standard_uncertainty,
-                ),
+                "target": quantities("mm", line.target),
+                "up": quantities("um", line.up, line.up_standard_uncertainty),
+                "down": quantities("um", line.down),
+                "reversal": quantities("um", line.reversal, line.reversal_standard_uncertainty),
                 "reasons": list(line.reasons),
             }
             for name, line in lines.items()
@@ -164,9 +156,7 @@ def _object(
     file: Path, warnings: Sequence[str], measured: Measured | None, predicted: Predicted | None
 ) -> PositionsObject:
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag positions 1",
-        "warnings": list(warnings),
+        **first_keys("positions", warnings),
         "file": str(file),
         "measured": measured,
         "predicted": predicted,
@@ -176,9 +166,8 @@ def _object(
 def _figures(figures: Mapping[str, PositionFigure]) -> dict[str, Any]:
     return {
         name: {
-            "at_mm": list(figure.at),
-            "interval_um": None if figure.interval is None else [in_unit("um", end) for end in figure.interval],
-            **measured("um", value=figure.value, standard_uncertainty=figure.standard_uncertainty),
+            "value": with_interval("um", figure.value, figure.interval, figure.standard_uncertainty),
+            "at": quantities("mm", figure.at),
         }
         for name, figure in figures.items()
     }
@@ -187,9 +176,10 @@ def _figures(figures: Mapping[str, PositionFigure]) -> dict[str, Any]:
 def _scatters(scatters: Iterable[TargetScatter]) -> list[Any]:
     return [
         {
-            "target_mm": scatter.target,
+            "target": quantity("mm", scatter.target),
+            "mean": quantity("um", scatter.mean),
+            "standard_deviation": quantity("um", scatter.deviation),
             "readings": scatter.count,
-            **measured("um", mean=scatter.mean, standard_deviation=scatter.deviation),
         }
         for scatter in scatters
     ]

@@ -2,62 +2,43 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, PredictedReading, __version__
+from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, PredictedReading
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.presentation.objects.calibration import Fit, fit_of
-from stepdiag.presentation.objects.evaluation import Faults, faults_of
-from stepdiag.presentation.objects.writer import in_unit, measured
+from stepdiag.presentation.objects.evaluation import Faults, channel_unit, faults_of
+from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.quantity import Quantity, Unit, quantity, with_interval
 from stepdiag.rechecking.recheck import Judged
-from stepdiag.units import MICROMETRE
+
+_UNITS: Final[dict[str, Unit]] = {"scale": "um/m", "bow": "um", "slope": "urad", "squareness": "urad"}
 
 
 class Change(TypedDict):
     """How a parameter has changed."""
 
     parameter: str
-    told: float
-    """How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only in sums."""
-
-
-class ScaleChange(Change):
-    """Of a positioning deviation, by the position."""
-
-    value_um_per_m: float
-    standard_uncertainty_um_per_m: float
-    """With the prior."""
-    prior_um_per_m: float
-
-
-class BowChange(Change):
-    """Of a straightness, in the middle of the travel."""
-
-    value_um: float
-    standard_uncertainty_um: float
-    """With the prior."""
-    prior_um: float
-
-
-class AngleChange(Change):
-    """Of an angle, from one end of the travel to the other, or of a squareness."""
-
-    value_urad: float
-    standard_uncertainty_urad: float
-    """With the prior."""
-    prior_urad: float
+    kind: Literal["scale", "bow", "slope", "squareness"]
+    """Of a positioning deviation, by the position; of a straightness, in the middle of the travel; of an angle, from
+    one end of the travel to the other; of a squareness."""
+    determined: float
+    """How much of it the readings determine, 0 to 1: near 1 by itself; in between only in sums."""
+    value: Quantity
+    """Its standard uncertainty: with the prior."""
+    prior: Quantity
+    """Standard uncertainty before the recheck."""
 
 
 class SumOfChanges(TypedDict):
-    """A sum of changes, each by its prior, that readings tell."""
+    """A sum of changes, each by its prior, that readings determine."""
 
     weight: dict[str, float]
     """By parameter; the square sum is 1."""
-    sum: float
-    u_sum: float
-    """Standard uncertainty, of the readings and the calibration alone."""
+    sum: Quantity
+    """Its standard uncertainty: of the readings and the calibration alone."""
 
 
 class Misfit(TypedDict):
@@ -69,26 +50,13 @@ class Misfit(TypedDict):
     line: str
     point: int
     channel: str
-
-
-class LengthMisfit(Misfit):
-    deviation_um: float
+    deviation: Quantity
     """Read minus predicted."""
-    standard_uncertainty_um: float
 
 
-class AngleMisfit(Misfit):
-    deviation_urad: float
-    """Read minus predicted."""
-    standard_uncertainty_urad: float
-
-
-class RecheckObject(TypedDict):
+class RecheckObject(Object):
     """Result of `stepdiag recheck`."""
 
-    stepdiag: str
-    format: Literal["stepdiag recheck 1"]
-    warnings: list[str]
     baseline: str
     """The file."""
     date: str
@@ -107,7 +75,7 @@ class RecheckObject(TypedDict):
     """unexplained: neither the baseline nor a change of low order explains the readings."""
     left_out: list[Faults]
     """Of the readings. All that they may have spoilt are left out of everything else."""
-    misfits: list[LengthMisfit | AngleMisfit]
+    misfits: list[Misfit]
     """Where the readings are not explained: those that are farthest from the machine with the change, worst first."""
     alpha: float
     chi_square: float
@@ -119,18 +87,13 @@ class RecheckObject(TypedDict):
     """Of all readings, with the change."""
     fit_degrees_of_freedom: int
     fit_probability: float
-    scales: list[ScaleChange]
-    bows: list[BowChange]
-    slopes: list[AngleChange]
-    squarenesses: list[AngleChange]
+    changes: list[Change]
     sums: list[SumOfChanges]
-    """The best told first."""
-    hidden_um: float
-    """What changes that the readings do not tell may move the tool by (k = 2)."""
-    largest_um: float | None
-    """Error in the volume with the change; null: not known"""
-    largest_interval_um: tuple[float, float] | None
-    """95 %; null: not known"""
+    """The best determined first."""
+    hidden: Quantity
+    """What changes that the readings do not determine may move the tool by (k = 2)."""
+    largest: Quantity
+    """Error in the volume with the change."""
 
 
 def recheck_object(
@@ -142,11 +105,8 @@ def recheck_object(
 ) -> RecheckObject:
     """Whether a machine has changed, and by what. `files`: the baseline, the run and what was written."""
     found = judged.recheck
-    interval = volume.largest_interval
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag recheck 1",
-        "warnings": list(warnings),
+        **first_keys("recheck", warnings),
         "baseline": str(files[0]),
         "date": judged.baseline.date,
         "fit": fit_of(judged.baseline),
@@ -164,44 +124,38 @@ def recheck_object(
         "fit_chi_square": found.fit_chi_square,
         "fit_degrees_of_freedom": found.fit_degrees_of_freedom,
         "fit_probability": found.fit_probability,
-        "scales": _changes(found.terms, "scale", "um_per_m"),
-        "bows": _changes(found.terms, "bow", "um"),
-        "slopes": _changes(found.terms, "slope", "urad"),
-        "squarenesses": _changes(found.terms, "squareness", "urad"),
+        "changes": [_change(term) for term in found.terms],
         "sums": [_sum(one, found.terms) for one in found.combinations],
-        "hidden_um": judged.hidden / MICROMETRE,
-        "largest_um": in_unit("um", volume.largest),
-        "largest_interval_um": None if interval is None else (interval[0] / MICROMETRE, interval[1] / MICROMETRE),
+        "hidden": quantity("um", judged.hidden),
+        "largest": with_interval("um", volume.largest, volume.largest_interval),
     }
 
 
-def _misfit(found: PredictedReading, measurement: Measurement) -> Any:
-    values = measured(
-        "urad" if found.channel in ("alpha", "beta") else "um",
-        deviation=found.deviation,
-        standard_uncertainty=found.standard_uncertainty,
-    )
-    place = {
+def _misfit(found: PredictedReading, measurement: Measurement) -> Misfit:
+    return {
         "row": found.row,
         "run": int(measurement.run[found.row]),
         "line": measurement.line[found.row],
         "point": int(measurement.point[found.row]),
+        "channel": found.channel,
+        "deviation": quantity(channel_unit(found.channel), found.deviation, found.standard_uncertainty),
     }
-    return {**place, "channel": found.channel, **values}
 
 
-def _changes(terms: Sequence[ChangeTerm], kind: str, unit: str) -> Any:
-    return [
-        {"parameter": term.parameter, "told": term.determined}
-        | measured(unit, value=term.value, standard_uncertainty=term.standard_uncertainty, prior=term.prior)
-        for term in terms
-        if term.kind == kind
-    ]
+def _change(term: ChangeTerm) -> Change:
+    kind: Any = term.kind
+    unit = _UNITS[term.kind]
+    return {
+        "parameter": term.parameter,
+        "kind": kind,
+        "determined": term.determined,
+        "value": quantity(unit, term.value, term.standard_uncertainty),
+        "prior": quantity(unit, term.prior),
+    }
 
 
 def _sum(one: ChangeCombination, terms: Sequence[ChangeTerm]) -> SumOfChanges:
     return {
         "weight": {term.parameter: weight for term, weight in zip(terms, one.weight, strict=True)},
-        "sum": one.value,
-        "u_sum": one.standard_uncertainty,
+        "sum": quantity("1", one.value, one.standard_uncertainty),
     }

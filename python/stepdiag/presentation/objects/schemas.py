@@ -34,8 +34,7 @@ def schema_text(name: str) -> str:
     described = getattr(import_module(module), kind)
     types = {one.__name__: one for one in _types(described, set())}
     for one in types.values():
-        # Keys that are not in the schema are refused; a string below a key describes it.
-        one.__pydantic_config__ = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+        one.__pydantic_config__ = ConfigDict(use_attribute_docstrings=True)  # a string below a key describes it
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema"} | TypeAdapter(described).json_schema()
     for one_name, one in schema["$defs"].items():
         for base in filter(is_typeddict, types[one_name].__orig_bases__):  # descriptions are not inherited

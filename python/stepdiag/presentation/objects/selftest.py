@@ -1,11 +1,12 @@
 """The object of `stepdiag selftest --json`."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import cast
 
 from typing_extensions import TypedDict
 
-from stepdiag.presentation.objects.writer import number
+from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.quantity import Quantity, Unit, stated
 from stepdiag.selftest.table import SelfTest
 
 
@@ -25,21 +26,16 @@ class TestedCase(TypedDict):
     compared: str
     truth: str
     """Where it comes from"""
-    deviation: float | None
-    """The largest one, in `unit`; null: the case ended with an error"""
-    allowed: float
-    unit: str
-    """mm, rad, nm, °C; 1: a number"""
+    deviation: Quantity
+    """The largest one; null: the case ended with an error"""
+    allowed: Quantity
     passed: bool
     error: str | None
 
 
-class SelftestObject(TypedDict):
+class SelftestObject(Object):
     """Result of `stepdiag selftest`."""
 
-    stepdiag: str
-    format: Literal["stepdiag selftest 1"]
-    warnings: list[str]
     passed: bool
     installation: TestedInstallation
     cases: list[TestedCase]
@@ -49,9 +45,7 @@ def selftest_object(found: SelfTest, warnings: Sequence[str]) -> SelftestObject:
     """What a self-test found."""
     tested = found.installation
     return {
-        "stepdiag": tested.stepdiag,
-        "format": "stepdiag selftest 1",
-        "warnings": list(warnings),
+        **first_keys("selftest", warnings),
         "passed": found.passed,
         "installation": {
             "sha256": tested.sha256,
@@ -66,12 +60,15 @@ def selftest_object(found: SelfTest, warnings: Sequence[str]) -> SelftestObject:
                 "case": row.case,
                 "compared": row.compared,
                 "truth": row.source,
-                "deviation": None if row.deviation is None else number(row.deviation),
-                "allowed": row.allowed,
-                "unit": row.unit,
+                "deviation": stated(_unit(row.unit), row.deviation, reason=row.error or "not finite"),
+                "allowed": stated(_unit(row.unit), row.allowed),
                 "passed": row.passed,
                 "error": row.error or None,
             }
             for row in found.rows
         ],
     }
+
+
+def _unit(name: str) -> Unit:
+    return "degC" if name == "°C" else cast(Unit, name)

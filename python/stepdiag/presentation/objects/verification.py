@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import Calibration, LineDeviation, Measurement, Verification, __version__
+from stepdiag._core import Calibration, LineDeviation, Measurement, Verification
 from stepdiag.presentation.objects.calibration import Fit, fit_of
-from stepdiag.presentation.objects.evaluation import Faults, faults_of
-from stepdiag.presentation.objects.writer import in_unit, measured
+from stepdiag.presentation.objects.evaluation import Faults, channel_unit, faults_of
+from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.quantity import Quantity, quantity
 from stepdiag.presentation.verification import agrees
 
 
@@ -19,9 +20,8 @@ class VerifiedLine(TypedDict):
     run: int
     line: str
     direction: Literal["forward", "backward"]
-    deviation_um: float
+    deviation: Quantity
     """Read minus predicted; of beams their mean."""
-    standard_uncertainty_um: float
     normalised: float
     """E_n: the deviation by its expanded uncertainty (k = 2)."""
 
@@ -35,19 +35,13 @@ class WorstReading(TypedDict):
     line: str
     point: int
     channel: str
-    deviation_um: float | None
-    """null: an angle"""
-    deviation_urad: float | None
-    """null: a length"""
+    deviation: Quantity
     normalised: float
 
 
-class VerificationObject(TypedDict):
+class VerificationObject(Object):
     """Result of `stepdiag verify`."""
 
-    stepdiag: str
-    format: Literal["stepdiag verification 1"]
-    warnings: list[str]
     calibration: str
     """The file."""
     date: str
@@ -79,9 +73,7 @@ def verification_object(
 ) -> VerificationObject:
     """How readings agree with a calibration."""
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag verification 1",
-        "warnings": list(warnings),
+        **first_keys("verification", warnings),
         "calibration": str(files[0]),
         "date": calibration.date,
         "fit": fit_of(calibration),
@@ -98,21 +90,24 @@ def verification_object(
 
 
 def _line(line: LineDeviation) -> Any:
-    values = measured("um", deviation=line.deviation, standard_uncertainty=line.standard_uncertainty)
-    return {**values, "run": line.run, "line": line.line, "direction": line.direction, "normalised": line.normalised}
+    return {
+        "run": line.run,
+        "line": line.line,
+        "direction": line.direction,
+        "deviation": quantity("um", line.deviation, line.standard_uncertainty),
+        "normalised": line.normalised,
+    }
 
 
 def _worst(verification: Verification, measurement: Measurement) -> WorstReading:
     row, channel = verification.worst
     deviation = float(verification.deviations[channel][row])
-    is_angle = channel in ("alpha", "beta")
     return {
         "row": row,
         "run": int(measurement.run[row]),
         "line": measurement.line[row],
         "point": int(measurement.point[row]),
         "channel": channel,
-        "deviation_um": None if is_angle else in_unit("um", deviation),
-        "deviation_urad": in_unit("urad", deviation) if is_angle else None,
+        "deviation": quantity(channel_unit(channel), deviation),
         "normalised": float(verification.normalised[channel][row]),
     }

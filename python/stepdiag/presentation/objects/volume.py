@@ -1,27 +1,16 @@
 """The object of `stepdiag volume --json`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import Calibration, __version__
-from stepdiag.calibration.volume import Interval, VolumeErrors, VolumeFigure
-from stepdiag.presentation.objects.calibration import Fit, fit_of, temperature_of
-from stepdiag.presentation.objects.writer import in_unit, measured
-
-
-class LengthFigure(TypedDict):
-    value_um: float | None
-    """null: a parameter that it needs is not determined"""
-    interval_um: list[float | None] | None
-    """95 %; null: the calibration has no covariance"""
-
-
-class AngleFigure(TypedDict):
-    value_urad: float | None
-    interval_urad: list[float | None] | None
+from stepdiag._core import Calibration
+from stepdiag.calibration.volume import VolumeErrors, VolumeFigure
+from stepdiag.presentation.objects.calibration import Fit, Temperature, fit_of, temperature_of
+from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.quantity import Quantities, Quantity, Unit, quantities, quantity, with_interval
 
 
 class Without(TypedDict):
@@ -30,60 +19,50 @@ class Without(TypedDict):
     name: str
     """A parameter, or an axis X, Y, Z."""
     parameters: list[str]
-    largest_um: float | None
-    rms_um: float | None
+    largest: Quantity
+    rms: Quantity
 
 
-class VolumeObject(TypedDict):
+class VolumeObject(Object, Temperature):
     """Result of `stepdiag volume`."""
 
-    stepdiag: str
-    format: Literal["stepdiag volume 1"]
     fit: Fit
-    warnings: list[str]
     file: str
-    temperature_reference_c: float | None
-    """Positioning errors are referred to it; null: they are as found."""
-    temperature_as_found_c: list[float] | None
-    """Of the scales of X, Y, Z; null: not recorded, or referred to a temperature."""
-    tool_mm: list[float]
-    box_mm: list[list[float]]
-    """Lowest and highest positions of X, Y, Z."""
+    tool: Quantities
+    box: list[Quantities]
+    """Of X, Y, Z: lowest and highest position."""
     positions: list[int]
     """Of X, Y, Z: the grid has all combinations."""
-    limit_um: float | None
+    limit: Quantity
     verdict: Literal["within", "not within", "undecided"] | None
     """Of the machine against the limit, at 95 %, as far as the calibration is valid (`fit`); null: no limit, or none
     for the reason below"""
     no_verdict_because: str | None
-    bounds_um: list[float | None] | None
+    bounds: Quantities
     """The largest error is above the first, and below the second, with 95 % or more each: the verdict's bounds."""
-    largest_um: float | None
-    """null: parameters are not determined"""
-    interval_um: list[float | None] | None
-    """95 % or more, of the largest error, with what lies between the nodes: 2.5 % at most beyond each end."""
-    at_mm: list[float] | None
+    largest: Quantity
+    """Largest error. Its interval: 95 % or more, with errors between the nodes; 2.5 % at most beyond each end."""
+    at: Quantities
     """Commanded position of the largest error."""
-    components_um: list[float | None]
+    components: Quantities
     """X, Y, Z of the largest error: actual minus nominal."""
-    rms_um: float | None
-    rms_interval_um: list[float | None] | None
-    between_nodes_um: float | None
-    """Standard uncertainty by what lies between the nodes."""
+    rms: Quantity
+    between_nodes: Quantity
+    """Standard uncertainty by errors between the nodes."""
     between_nodes_estimated: bool
     """From second differences of the tables; false: it was stated"""
-    ranges: dict[str, LengthFigure]
+    ranges: dict[str, Quantity]
     """X, Y, Z: largest minus smallest component."""
-    tilts: dict[str, AngleFigure]
+    tilts: dict[str, Quantity]
     """A, B, C: largest absolute rotation of the tool."""
-    tilt_ranges: dict[str, AngleFigure]
+    tilt_ranges: dict[str, Quantity]
     """A, B, C: largest minus smallest rotation."""
-    diagonals: dict[str, LengthFigure]
+    diagonals: dict[str, Quantity]
     """ppp, npp, pnp, nnp: range of the errors along a body diagonal of the box."""
     missing: dict[str, list[str]]
     """X ... C: parameters that act in it and are not determined."""
-    other_approaches_um: dict[str, float | None]
-    """-++ ...: largest error of X, Y, Z approached in these directions; empty: not known. No interval."""
+    other_approaches: dict[str, Quantity]
+    """-++ ...: largest error of X, Y, Z approached in these directions; empty: not known."""
     ranking: list[Without]
     """Parameters, then axes; the smallest largest error first."""
 
@@ -91,50 +70,54 @@ class VolumeObject(TypedDict):
 def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> VolumeObject:
     """The errors of a calibration over a volume."""
     assert isinstance(found.source, Calibration)
-    at = None if found.missing.keys() & set("XYZ") else found.largest_at.tolist()
+    missing = sorted({name for axis in "XYZ" for name in found.missing.get(axis, ())})
+    why = f"not determined: {', '.join(missing)}" if missing else "not known"
     return {
-        "stepdiag": __version__,
-        "format": "stepdiag volume 1",
+        **first_keys("volume", warnings),
         "fit": fit_of(found.source),
-        "warnings": list(warnings),
         "file": str(file),
         **temperature_of(found.source),
-        "tool_mm": found.tool.tolist(),
-        "box_mm": found.box.tolist(),
+        "tool": quantities("mm", found.tool),
+        "box": [quantities("mm", edge) for edge in found.box],
         "positions": list(found.shape),
-        "limit_um": in_unit("um", found.limit),
+        "limit": quantity("um", found.limit, reason="not stated"),
         "verdict": found.verdict,
         "no_verdict_because": found.no_verdict_because or None,
-        "bounds_um": _ends(found.bounds, "um"),
-        "largest_um": in_unit("um", found.largest),
-        "interval_um": _ends(found.largest_interval, "um"),
-        "at_mm": at,
-        "components_um": [in_unit("um", component) for component in found.largest_components],
-        "rms_um": in_unit("um", found.rms),
-        "rms_interval_um": _ends(found.rms_interval, "um"),
-        "between_nodes_um": in_unit("um", found.between_nodes),
+        "bounds": quantities("um", found.bounds, reason=why),
+        "largest": with_interval("um", found.largest, found.largest_interval, reason=why),
+        "at": quantities("mm", None if missing else found.largest_at, reason=why),
+        "components": quantities("um", found.largest_components),
+        "rms": with_interval("um", found.rms, found.rms_interval, reason=why),
+        "between_nodes": quantity("um", found.between_nodes),
         "between_nodes_estimated": found.between_nodes_estimated,
-        "ranges": {name: _figure(figure, "um") for name, figure in found.ranges.items()},
-        "tilts": {name: _figure(figure, "urad") for name, figure in found.tilts.items()},
-        "tilt_ranges": {name: _figure(figure, "urad") for name, figure in found.tilt_ranges.items()},
-        "diagonals": {name: _figure(figure, "um") for name, figure in found.diagonals.items()},
+        "ranges": _figures("um", found.ranges, found.missing),
+        "tilts": _figures("urad", found.tilts, found.missing),
+        "tilt_ranges": _figures("urad", found.tilt_ranges, found.missing),
+        "diagonals": {
+            name: with_interval("um", figure.value, figure.interval, reason=why)
+            for name, figure in found.diagonals.items()
+        },
         "missing": {name: list(parameters) for name, parameters in found.missing.items()},
-        "other_approaches_um": {name: in_unit("um", value) for name, value in found.other_approaches.items()},
+        "other_approaches": {name: quantity("um", value, reason=why) for name, value in found.other_approaches.items()},
         "ranking": [
             {
                 "name": one.name,
                 "parameters": list(one.parameters),
-                "largest_um": in_unit("um", one.largest),
-                "rms_um": in_unit("um", one.rms),
+                "largest": quantity("um", one.largest, reason=why),
+                "rms": quantity("um", one.rms, reason=why),
             }
             for one in found.ranking
         ],
     }
 
 
-def _ends(interval: Interval | None, unit: str) -> list[float | None] | None:
-    return None if interval is None else [in_unit(unit, end) for end in interval]
-
-
-def _figure(figure: VolumeFigure, unit: str) -> Any:
-    return {**measured(unit, value=figure.value), f"interval_{unit}": _ends(figure.interval, unit)}
+def _figures(
+    unit: Unit, figures: Mapping[str, VolumeFigure], missing: Mapping[str, Sequence[str]]
+) -> dict[str, Quantity]:
+    """By axis, X ... C."""
+    return {
+        axis: with_interval(
+            unit, figure.value, figure.interval, reason=f"not determined: {', '.join(missing.get(axis, ()))}"
+        )
+        for axis, figure in figures.items()
+    }

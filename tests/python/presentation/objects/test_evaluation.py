@@ -9,7 +9,9 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.parameters import units_of
+from stepdiag.presentation.objects.calibration import value_unit
+from stepdiag.presentation.quantity import BY_KEY
+from stepdiag.setup_quantities import SETUP_QUANTITIES
 from stepdiag.units import UNITS
 
 TILTED = SCENARIO.replace("steps = 5", "steps = 20").replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
@@ -46,13 +48,12 @@ def test_values_are_those_of_the_written_file_to_the_last_bit(here: Path, capsys
     tables = printed("evaluation", capsys, "evaluate", *FILES, "-o", "c.csv")["calibration"]
     found = {}
     for table in tables["functions"]:
-        unit = "um" if units_of(table["parameter"]) == "mm" else "urad"
-        for p, value, u in zip(
-            table["position_mm"], table[f"value_{unit}"], table[f"standard_uncertainty_{unit}"], strict=True
-        ):
-            found[table["parameter"], repr(p)] = value, u
+        value = table["value"]
+        assert value["unit"] == value_unit(table["parameter"])
+        for p, one, u in zip(table["position"]["value"], value["value"], value["standard_uncertainty"], strict=True):
+            found[table["parameter"], repr(p)] = one, u
     for one in tables["squarenesses"]:
-        found[one["parameter"], ""] = one["value_urad"], one["standard_uncertainty_urad"]
+        found[one["parameter"], ""] = one["value"]["value"], one["value"]["standard_uncertainty"]
     assert found == texts_in("c.csv")
 
 
@@ -83,10 +84,11 @@ def test_adjustment_has_setup_reliability_and_fit(here: Path, capsys: pytest.Cap
     estimates = [estimate for estimate in found.setup if estimate.prior > 0.0]
     assert len(adjustment["setup"]) == len(estimates) > 0
     for own, estimate in zip(adjustment["setup"], estimates, strict=True):
-        (value,) = [own[key] for key in own if key.startswith("value_")]
-        (key,) = [key for key in own if key.startswith("value_")]
+        value = own["value"]
+        assert value["unit"] == BY_KEY[SETUP_QUANTITIES[estimate.quantity].report_unit]
         # Both are roundings of one number.
-        np.testing.assert_allclose(value * UNITS[key.removeprefix("value_")].native, estimate.value, rtol=1e-15)
+        native = SETUP_QUANTITIES[estimate.quantity].report_unit
+        np.testing.assert_allclose(value["value"] * UNITS[native].native, estimate.value, rtol=1e-15)
 
 
 def test_fault_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,7 +97,9 @@ def test_fault_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (fault,) = said["adjustment"]["faults"]
     assert any(member["row"] == 10 and member["channel"] == "distance" for member in fault["members"])
     # 50 µm are in it; the noise of the readings is 0.1 µm.
-    assert any(abs(member.get("size_um", 0.0) - 50.0) < 5.0 for member in fault["members"])
+    assert any(
+        member["size"]["unit"] == "um" and abs(member["size"]["value"] - 50.0) < 5.0 for member in fault["members"]
+    )
 
 
 def test_rejected_fit_prints_its_object_and_ends_with_status_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,7 +107,11 @@ def test_rejected_fit_prints_its_object_and_ends_with_status_3(here: Path, capsy
     wrong(0.05)
     said = printed("evaluation", capsys, "evaluate", *FILES, "-o", "c.csv", status=3)
     assert said["fit"]["verdict"] == "rejected"
-    assert said["fit"]["reasons"] == sd.read_calibration("c.csv").fit_reasons
+    written = sd.read_calibration("c.csv")
+    assert [(reason["code"], reason["text"]) for reason in said["fit"]["reasons"]] == list(
+        zip(written.fit_codes, written.fit_reasons, strict=True)
+    )
+    assert "fault" in written.fit_codes
     assert len(said["warnings"]) == 1
 
 
@@ -114,6 +122,8 @@ def test_linear_method_tells_both_verdicts(here: Path, capsys: pytest.CaptureFix
     said = printed("evaluation", capsys, "evaluate", *FILES, "-m", method, "-o", "c.csv", status=status)
     assert said["adjustment"] is None
     assert said["linear"]["adjustment_verdict"] == "accepted"
+    own = [reason["code"] for reason in said["fit"]["reasons"] if "by itself" in reason["text"]]
+    assert own == ["method_by_itself"] * (said["linear"]["own_verdict"] != "accepted")
     assert said["fit"]["noise_alone"]
     # The conventional method determines no rotations, and says so as data as well.
     assert len(said["calibration"]["findings"]) == len(said["calibration"]["undetermined"])
@@ -129,6 +139,24 @@ def test_undetermined_and_combinations_are_told(here: Path, capsys: pytest.Captu
     ]
     assert len(said["adjustment"]["combinations"]) == len(found.combinations)
     assert said["calibration"]["undetermined"] == found.calibration.undetermined != []
+
+
+def test_what_is_undetermined_has_no_value_and_a_reason(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["evaluate", *FILES, "-m", "conventional", "-o", "c.csv"])
+    for arguments in (
+        ["evaluation", "evaluate", *FILES, "-m", "conventional", "-o", "c.csv"],
+        ["report", "report", "c.csv"],
+    ):
+        name, *command = arguments
+        status = 3 if sd.read_calibration("c.csv").fit == "rejected" else 0
+        tables = printed(name, capsys, *command, status=status)["calibration"]
+        found = sd.read_calibration("c.csv")
+        assert len(tables["functions"]) == 18
+        open_ones = [one for one in tables["functions"] if one["parameter"] not in found.functions]
+        assert {one["parameter"] for one in open_ones} >= {"EAX", "EBX", "ECX"}  # rotations: distances alone
+        for one in open_ones:
+            assert one["value"]["value"] is None
+            assert one["value"]["reason"] == "not in the calibration" or one["value"]["reason"] in found.undetermined
 
 
 def test_error_prints_nothing_on_standard_output(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

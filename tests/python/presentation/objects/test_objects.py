@@ -1,7 +1,6 @@
 """`--json` of check, compare, observe and report."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,10 +31,7 @@ def reject(file: str, name: str) -> None:
     sd.read_calibration(file).judged("rejected", ["it was dropped"]).write(name)
 
 
-def one_value(entry: dict[str, Any], beginning: str) -> tuple[Any, float]:
-    """What stands under the key that begins so, and the native size of its unit."""
-    (key,) = [key for key in entry if key.startswith(f"{beginning}_u")]
-    return entry[key], {"um": 1e-3, "urad": 1e-6}[key.removeprefix(f"{beginning}_")]
+NATIVE = {"um": 1e-3, "urad": 1e-6}
 
 
 def test_report_has_the_values_of_its_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -43,10 +39,10 @@ def test_report_has_the_values_of_its_file(here: Path, capsys: pytest.CaptureFix
     read = sd.read_calibration("b.nc")
     for table in said["calibration"]["functions"]:
         position, value, u = read.functions[table["parameter"]]
-        np.testing.assert_array_equal(table["position_mm"], position)
+        np.testing.assert_array_equal(table["position"]["value"], position)
+        said_value, unit = table["value"], NATIVE[table["value"]["unit"]]
         for key, own in (("value", value), ("standard_uncertainty", u)):
-            numbers, unit = one_value(table, key)
-            np.testing.assert_allclose(np.array(numbers) * unit, own, rtol=1e-15)  # both round one number
+            np.testing.assert_allclose(np.array(said_value[key]) * unit, own, rtol=1e-15)  # both round one number
     assert len(said["calibration"]["functions"]) == len(read.functions) == 18
     assert [one["parameter"] for one in said["calibration"]["squarenesses"]] == ["C0Y", "B0Z", "A0Z"]
     assert [one["parameter"] for one in said["functional_point"]] == list(functional_point_straightness(read))
@@ -55,14 +51,15 @@ def test_report_has_the_values_of_its_file(here: Path, capsys: pytest.CaptureFix
 def test_largest_values_are_the_largest_of_the_tables(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = printed("report", capsys, "report", "b.nc")
     read = sd.read_calibration("b.nc")
-    for key, column, which in (("largest_values", 1, "value"), ("largest_standard_uncertainties", 2, "standard_unc")):
+    for key, column, which in (
+        ("largest_values", 1, "value"),
+        ("largest_standard_uncertainties", 2, "standard_uncertainty"),
+    ):
         for one in said[key]:
             tables = [table[column] for name, table in read.functions.items() if kind_of(name) == one["kind"]]
             angles = [pair[column - 1] for name, pair in read.squareness.items() if kind_of(name) == one["kind"]]
             largest = max(np.max(np.abs(np.concatenate([np.atleast_1d(t) for t in (*tables, *angles)]))), 0.0)
-            which_key = "value" if which == "value" else "standard_uncertainty"
-            size, unit = one_value(one, which_key)
-            assert abs(size) * unit == pytest.approx(largest, rel=1e-15)
+            assert abs(one["value"][which]) * NATIVE[one["value"]["unit"]] == pytest.approx(largest, rel=1e-15)
         assert [one["kind"] for one in said[key]] == ["positioning", "straightness", "angle", "squareness"]
 
 
@@ -70,7 +67,10 @@ def test_report_of_a_rejected_fit_ends_with_status_3(here: Path, capsys: pytest.
     reject("a.csv", "r.csv")
     said = printed("report", capsys, "report", "r.csv", status=3)
     assert said["fit"]["verdict"] == "rejected"
-    assert said["fit"]["reasons"] == ["it was dropped"]
+    assert said["fit"]["reasons"] == [{"code": None, "text": "it was dropped"}]  # as of an earlier version
+    sd.read_calibration("a.csv").judged("rejected", ["it was dropped"], ["dropped"]).write("s.nc")
+    said = printed("report", capsys, "report", "s.nc", status=3)
+    assert said["fit"]["reasons"] == [{"code": "dropped", "text": "it was dropped"}]
 
 
 def test_csv_without_uncertainties_gives_null(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -79,7 +79,7 @@ def test_csv_without_uncertainties_gives_null(here: Path, capsys: pytest.Capture
     sd.Calibration(**parts).write("n.csv")
     said = printed("report", capsys, "report", "n.csv")
     (table,) = [table for table in said["calibration"]["functions"] if table["parameter"] == "EXX"]
-    assert set(table["standard_uncertainty_um"]) == {None}
+    assert set(table["value"]["standard_uncertainty"]) == {None}
 
 
 def test_comparison_has_the_differences(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,9 +91,9 @@ def test_comparison_has_the_differences(here: Path, capsys: pytest.CaptureFixtur
     for own, difference in zip(said["differences"], comparison.differences, strict=True):
         assert own["parameter"] == difference.parameter
         assert own["probability"] == comparison.probability(difference)
-        numbers, unit = one_value(own, "difference")
+        numbers, unit = own["difference"]["value"], NATIVE[own["difference"]["unit"]]
         np.testing.assert_allclose(np.array(numbers) * unit, difference.value, rtol=1e-15)  # both round one number
-        positions = [np.nan if p is None else p for p in own["position_mm"]]
+        positions = [np.nan if p is None else p for p in own["position"]["value"]]
         np.testing.assert_array_equal(positions, difference.position)
 
 
@@ -114,10 +114,10 @@ def test_observation_has_what_the_plan_determines(here: Path, capsys: pytest.Cap
     table = prospects(known, [5, 10])
     for own, prospect in zip(said["by_steps"], table, strict=True):
         assert own["steps"] == prospect.steps
-        assert own["mirror_mm"] == list(prospect.mirror)
+        assert own["mirror"]["value"] == list(prospect.mirror)
         sizes = own["largest_standard_uncertainty"]
-        assert sizes["positioning_um"] * 1e-3 == pytest.approx(prospect.largest["positioning"], rel=1e-15)
-        assert sizes["angle_urad"] * 1e-6 == pytest.approx(prospect.largest["angle"], rel=1e-15)
+        assert sizes["positioning"]["value"] * 1e-3 == pytest.approx(prospect.largest["positioning"], rel=1e-15)
+        assert sizes["angle"]["value"] * 1e-6 == pytest.approx(prospect.largest["angle"], rel=1e-15)
 
 
 def test_observation_of_a_plan_that_determines_little_names_it(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -125,7 +125,7 @@ def test_observation_of_a_plan_that_determines_little_names_it(here: Path, capsy
     said = printed("observation", capsys, "observe", "scenario.toml", "--steps", "5")
     assert said["undetermined"]
     assert len(said["findings"]) == len(said["undetermined"])
-    assert said["by_steps"][0]["largest_standard_uncertainty"]["squareness_urad"] is None or said["combinations"]
+    assert said["by_steps"][0]["largest_standard_uncertainty"]["squareness"]["value"] is None or said["combinations"]
 
 
 def test_check_tells_files_and_runs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -100,15 +100,13 @@ def test_values_on_the_page_are_those_of_the_file_bit_by_bit(evaluated: Path) ->
     found = {one["parameter"]: one for one in said["calibration"]["functions"]}
     assert found.keys() == calibration.functions.keys()
     for name, (position, value, u) in calibration.functions.items():
-        unit, power = ("um", 3) if sd.kind_of(name) in ("positioning", "straightness") else ("urad", 6)
-        native = [
-            [float(f"{one!r}e-{power}") for one in found[name][f"{key}_{unit}"]]
-            for key in ("value", "standard_uncertainty")
-        ]
+        said_value = found[name]["value"]
+        power = {"um": 3, "urad": 6}[said_value["unit"]]
+        native = [[float(f"{one!r}e-{power}") for one in said_value[key]] for key in ("value", "standard_uncertainty")]
         # The decimal point is moved in the text of the number: back it gives the same number but for one rounding.
         np.testing.assert_allclose(native[0], value, rtol=3e-16, atol=0.0)
         np.testing.assert_allclose(native[1], u, rtol=3e-16, atol=0.0)
-        assert found[name]["position_mm"] == position.tolist()
+        assert found[name]["position"]["value"] == position.tolist()
     assert said["fit"]["verdict"] == calibration.fit
 
 
@@ -142,7 +140,7 @@ def test_curves_and_volume_say_for_which_temperature_they_are(evaluated: Path) -
     page = page_of(calibration=Path("referred.csv"), before=Path("found.csv"))
     assert "Positioning errors: referred to 20 °C; before: as found at X 23.1, Y 23.0, Z 22.8 °C." in page.text
     assert "Positioning errors: referred to 20 °C. " in page.text
-    assert page.values()["volume"]["temperature_reference_c"] == 20.0
+    assert page.values()["volume"]["temperature_reference"]["value"] == 20.0
     assert page_of(calibration=Path("calibration.csv")).text.count("Positioning errors: temperature not recorded.") == 2
 
 
@@ -182,7 +180,7 @@ def test_both_directions_of_approach_are_drawn_and_told(here: Path) -> None:
     else:
         largest = shown(1e3 * max(found.other_approaches.values()))
         assert re.search(rf"approached in X[+−] Y[+−] Z[+−], the largest error is {largest}", page.text)
-    assert page.values()["volume"]["other_approaches_um"].keys() == found.other_approaches.keys()
+    assert page.values()["volume"]["other_approaches"].keys() == found.other_approaches.keys()
 
 
 def test_page_can_be_read_without_seeing_it(evaluated: Path) -> None:
