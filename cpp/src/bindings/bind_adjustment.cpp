@@ -5,6 +5,7 @@
 #include "options.hpp"
 #include "stepdiag/adjustment/fit_quality.hpp"
 #include "stepdiag/evaluation/thresholds.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -61,12 +62,6 @@ struct AdjustmentOfRun {
 };
 
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
-
-Slips to_slips(const std::string& slips) {
-    for (const Slips choice : {Slips::report, Slips::estimate})
-        if (slips == name(choice)) return choice;
-    throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + slips + "\"");
-}
 
 void bind_thresholds(py::module_& m) {
     py::class_<Thresholds> bound(m, "Thresholds",
@@ -125,6 +120,40 @@ struct handle_type_name<stepdiag::bindings::PriorLike> {
 }  // namespace pybind11::detail
 
 namespace stepdiag::bindings {
+
+template <>
+Slips parsed<Slips>(const std::string& word) {
+    for (const Slips choice : {Slips::report, Slips::estimate})
+        if (word == name(choice)) return choice;
+    throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + word + "\"");
+}
+
+// In Python, SetupPriors are what constructors made: an object of their own.
+template <>
+struct InPython<SetupPriors> {
+    static constexpr bool is_plain = false;
+    using Argument = Priors;
+    static const SetupPriors& from(const Priors& given, const char*) { return given.value; }
+    static Priors of(const SetupPriors& value) { return {value}; }
+    static Priors usual(const SetupPriors& value) { return {value}; }
+};
+template <>
+struct InPython<std::map<std::string, SetupPriors>> {
+    static constexpr bool is_plain = false;
+    using Argument = std::map<std::string, Priors>;
+    static std::map<std::string, SetupPriors> from(const Argument& given, const char*) {
+        std::map<std::string, SetupPriors> by_line;
+        for (const auto& [line, priors] : given) by_line[line] = priors.value;
+        return by_line;
+    }
+    static Argument of(const std::map<std::string, SetupPriors>& value) {
+        Argument by_line;
+        for (const auto& [line, priors] : value) by_line[line] = {priors};
+        return by_line;
+    }
+    static Argument usual(const std::map<std::string, SetupPriors>& value) { return of(value); }
+};
+
 namespace {
 
 // One keyword for each unknown, with its name in the table.
@@ -140,167 +169,108 @@ void bind_priors(py::module_& m, std::index_sequence<quantity...>) {
              py::kw_only(), (py::arg(setup_quantities[quantity].name.data()) = none())..., "Raises InvalidArgument.");
 }
 
-void bind_options(py::module_& m) {
+void bind_adjustment_options(py::module_& m) {
     bind_priors(m, std::make_index_sequence<adjusted_quantity_count>());
 
-    py::class_<Smoothness>(m, "Smoothness",
-                           "Standard deviations with which second differences of neighbouring nodes are known to be 0: "
-                           "translation (mm), rotation (rad); 0: no such knowledge. cross_validated: found for each "
-                           "function, not below these.")
-        .def(py::init([](double translation, double rotation, bool cross_validated) {
-                 return Smoothness{translation, rotation, cross_validated};
-             }),
-             py::kw_only(), py::arg("translation") = 0.0, py::arg("rotation") = 0.0, py::arg("cross_validated") = false)
-        .def_readonly("translation", &Smoothness::translation)
-        .def_readonly("rotation", &Smoothness::rotation)
-        .def_readonly("cross_validated", &Smoothness::cross_validated);
+    bind_options<Smoothness>(
+        m, "Smoothness",
+        "Standard deviations with which second differences of neighbouring nodes are known to be 0; 0: no such "
+        "knowledge.",
+        nullptr, field("translation", &Smoothness::translation, "mm"), field("rotation", &Smoothness::rotation, "rad"),
+        field("cross_validated", &Smoothness::cross_validated, "They are found for each function, not below these."));
 
-    py::class_<MachineDrift>(m, "MachineDrift",
-                             "A drift of the functional point along the axes that is no expansion of scales, in "
-                             "proportion to a record since the run's first reading: its rates are unknowns.")
-        .def(py::init([](const ArrayLike& standard_uncertainty, const std::string& record) {
-                 return MachineDrift{to_vector3(standard_uncertainty, "standard_uncertainty"), record};
-             }),
-             py::arg("standard_uncertainty"), py::kw_only(), py::arg("record") = MachineDrift{}.record,
-             "standard_uncertainty (3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no "
-             "drift. record: \"time\", or the channel of a temperature: \"temperature\", \"temperature_x\", ..., "
-             "\"air_temperature\". adjust() checks them.")
-        .def_property_readonly("standard_uncertainty",
-                               [](const MachineDrift& d) { return to_numpy_vector(d.standard_uncertainty); })
-        .def_readonly("record", &MachineDrift::record);
+    bind_options<MachineDrift, 1>(
+        m, "MachineDrift",
+        "A drift of the functional point along the axes that is no expansion of scales, in proportion to a record "
+        "since "
+        "the run's first reading: its rates are unknowns. adjust() checks it.",
+        nullptr,
+        required("standard_uncertainty", &MachineDrift::standard_uncertainty,
+                 "(3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no drift"),
+        field("record", &MachineDrift::record,
+              "\"time\", or the channel of a temperature: \"temperature\", \"temperature_x\", ..., "
+              "\"air_temperature\"."));
 
-    const AdjustmentOptions usual;
-    py::class_<AdjustmentOptions>(
-        m, "AdjustmentOptions",
-        "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
-        "lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its "
-        "set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has "
-        "no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named "
-        "and not corrected. slips: \"report\" rejects a run with a slip, \"estimate\" makes it an unknown and accepts "
-        "that. "
-        "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
-        "the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that "
-        "are "
-        "uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the "
-        "readings control. search_faults: False: it is "
-        "known "
-        "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not "
-        "reached "
-        "soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative "
-        "standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; "
-        "they count in the uncertainties only. variance_components: estimates how much each channel scatters, and "
-        "takes that "
-        "for its noise where it is more than is stated.")
-        .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
-                         const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
-                         bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
-                         const std::string& slips, bool scale_uncertainty, bool full_covariance,
-                         const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
-                         const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults,
-                         double distance_scale_uncertainty, double air_index_uncertainty, bool variance_components) {
-                 AdjustmentOptions options{uncertainty,
-                                           setup.value,
-                                           {},
-                                           one_setup_per_line,
-                                           reversal,
-                                           rotations,
-                                           smoothness,
-                                           outlier_probability,
-                                           to_slips(slips),
-                                           scale_uncertainty,
-                                           full_covariance,
-                                           plausible,
-                                           expansion,
-                                           machine_drift,
-                                           reliability,
-                                           search_faults,
-                                           distance_scale_uncertainty,
-                                           air_index_uncertainty,
-                                           variance_components};
-                 for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
-                 return options;
-             }),
-             py::kw_only(), py::arg("uncertainty") = usual.uncertainty, py::arg("setup") = Priors{},
-             py::arg("setup_by_line") = std::map<std::string, Priors>{},
-             py::arg("one_setup_per_line") = usual.one_setup_per_line, py::arg("reversal") = usual.reversal,
-             py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
-             py::arg("outlier_probability") = usual.outlier_probability, py::arg("slips") = name(usual.slips),
-             py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
-             py::arg("plausible") = usual.plausible, py::arg("expansion") = std::nullopt,
-             py::arg("machine_drift") = std::nullopt, py::arg("reliability") = usual.reliability,
-             py::arg("search_faults") = usual.search_faults,
-             py::arg("distance_scale_uncertainty") = usual.distance_scale_uncertainty,
-             py::arg("air_index_uncertainty") = usual.air_index_uncertainty,
-             py::arg("variance_components") = usual.variance_components, "adjust() checks them.")
-        .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
-        .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
-        .def_property_readonly("setup_by_line",
-                               [](const AdjustmentOptions& o) {
-                                   std::map<std::string, Priors> by_line;
-                                   for (const auto& [line, priors] : o.setup_by_line) by_line[line] = {priors};
-                                   return by_line;
-                               })
-        .def_readonly("one_setup_per_line", &AdjustmentOptions::one_setup_per_line)
-        .def_readonly("reversal", &AdjustmentOptions::reversal)
-        .def_readonly("rotations", &AdjustmentOptions::rotations)
-        .def_readonly("smoothness", &AdjustmentOptions::smoothness,
-                      "None: errors of neighbouring nodes are independent.")
-        .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
-        .def_property_readonly("slips", [](const AdjustmentOptions& o) { return name(o.slips); })
-        .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
-        .def_readonly("full_covariance", &AdjustmentOptions::full_covariance,
-                      "Whether the calibration has the covariance of all its entries.")
-        .def_readonly("plausible", &AdjustmentOptions::plausible)
-        .def_readonly("expansion", &AdjustmentOptions::expansion)
-        .def_readonly("machine_drift", &AdjustmentOptions::machine_drift)
-        .def_readonly("reliability", &AdjustmentOptions::reliability)
-        .def_readonly("search_faults", &AdjustmentOptions::search_faults)
-        .def_readonly("distance_scale_uncertainty", &AdjustmentOptions::distance_scale_uncertainty)
-        .def_readonly("air_index_uncertainty", &AdjustmentOptions::air_index_uncertainty)
-        .def_readonly("variance_components", &AdjustmentOptions::variance_components);
+    bind_options<AdjustmentOptions>(
+        m, "AdjustmentOptions", "What adjust() takes for known and unknown, and checks.", nullptr,
+        field("uncertainty", &AdjustmentOptions::uncertainty, "Of readings where the run states none."),
+        field("setup", &AdjustmentOptions::setup, "How the set-up of all lines is known."),
+        field("setup_by_line", &AdjustmentOptions::setup_by_line,
+              "Line -> SetupPriors that replace the quantities that they name."),
+        field("one_setup_per_line", &AdjustmentOptions::one_setup_per_line, "All runs of a line share its set-up."),
+        field("reversal", &AdjustmentOptions::reversal,
+              "Tables of their own for nodes that are approached in - direction."),
+        field("rotations", &AdjustmentOptions::rotations, "False: the machine has no angular errors."),
+        field("smoothness", &AdjustmentOptions::smoothness, "None: errors of neighbouring nodes are independent."),
+        field("outlier_probability", &AdjustmentOptions::outlier_probability,
+              "Of a false alarm among a thousand tests for faults; 0: faults are named and not corrected."),
+        field("slips", &AdjustmentOptions::slips,
+              "\"report\" rejects a run with a slip, \"estimate\" makes it an unknown and accepts that."),
+        field("scale_uncertainty", &AdjustmentOptions::scale_uncertainty,
+              "Where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is "
+              "doubtful at best."),
+        field("full_covariance", &AdjustmentOptions::full_covariance,
+              "Whether the calibration has the covariance of all its entries."),
+        field("plausible", &AdjustmentOptions::plausible, "What a machine can be."),
+        field("expansion", &AdjustmentOptions::expansion,
+              "Of the scales; coefficients that are uncertain are unknowns."),
+        field("machine_drift", &AdjustmentOptions::machine_drift, "Its rates are unknowns."),
+        field("reliability", &AdjustmentOptions::reliability, "Also which faults the readings control."),
+        field("search_faults", &AdjustmentOptions::search_faults,
+              "False: it is known already what is wrong with the run as a whole. Faults are not looked for; where the "
+              "minimum is not reached soon, values are those that were, and rejected."),
+        field("distance_scale_uncertainty", &AdjustmentOptions::distance_scale_uncertainty,
+              "Relative standard uncertainty of all distances in common, by the instrument's scale; it counts in the "
+              "uncertainties only."),
+        field("air_index_uncertainty", &AdjustmentOptions::air_index_uncertainty, "The same, by the index of the air."),
+        field("variance_components", &AdjustmentOptions::variance_components,
+              "Estimates how much each channel scatters, and takes that for its noise where it is more than is "
+              "stated."));
 }
 
 void bind_result(py::module_& m) {
-    py::class_<SetupEstimate>(m, "SetupEstimate", "One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.")
-        .def_readonly("run", &SetupEstimate::run, "The first run that has this set-up.")
-        .def_readonly("line", &SetupEstimate::line, "Such as \"ppp\".")
-        .def_property_readonly(
-            "quantity", [](const SetupEstimate& e) { return name(e.quantity); }, "\"reflector\", \"laser\", ...")
-        .def_readonly("component", &SetupEstimate::component, "0 or 1 of pairs; of beam_constants 1 for d2, ...")
-        .def_readonly("value", &SetupEstimate::value, "None where it is not determined.")
-        .def_readonly("standard_uncertainty", &SetupEstimate::standard_uncertainty, "In the unit of the value.")
-        .def_readonly(
-            "prior", &SetupEstimate::prior,
-            "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
-            "roll, gain).");
+    bind_record(
+        m, "SetupEstimate", "One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.",
+        field("run", &SetupEstimate::run, "The first run that has this set-up."),
+        field("line", &SetupEstimate::line, "Such as \"ppp\"."),
+        field("quantity", &SetupEstimate::quantity, "\"reflector\", \"laser\", ..."),
+        field("component", &SetupEstimate::component, "0 or 1 of pairs; of beam_constants 1 for d2, ..."),
+        field("value", &SetupEstimate::value, "None where it is not determined."),
+        field("standard_uncertainty", &SetupEstimate::standard_uncertainty, "In the unit of the value."),
+        field("prior", &SetupEstimate::prior,
+              "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
+              "roll, gain)."));
 
-    py::class_<ExpansionEstimate>(m, "ExpansionEstimate", "An expansion coefficient as it was found, 1/K.")
-        .def_readonly("axes", &ExpansionEstimate::axes, "That have it in common: 0, 1, 2 of X, Y, Z.")
-        .def_readonly("value", &ExpansionEstimate::value, "1/K")
-        .def_readonly("standard_uncertainty", &ExpansionEstimate::standard_uncertainty, "1/K")
-        .def_readonly("stated", &ExpansionEstimate::stated, "Value of its prior.")
-        .def_readonly("prior", &ExpansionEstimate::prior, "Standard uncertainty of its prior.");
+    bind_record(m, "ExpansionEstimate", "An expansion coefficient as it was found, 1/K.",
+                field("axes", &ExpansionEstimate::axes, "That have it in common: 0, 1, 2 of X, Y, Z."),
+                field("value", &ExpansionEstimate::value, "1/K"),
+                field("standard_uncertainty", &ExpansionEstimate::standard_uncertainty, "1/K"),
+                field("stated", &ExpansionEstimate::stated, "Value of its prior."),
+                field("prior", &ExpansionEstimate::prior, "Standard uncertainty of its prior."));
 
-    py::class_<RoundedChannel>(m, "RoundedChannel",
-                               "What took the place of a channel's stated uncertainties, which were too small; mm or "
-                               "rad.")
-        .def_readonly("channel", &RoundedChannel::channel, "\"distance\", ...")
-        .def_readonly("stated", &RoundedChannel::stated, "Standard uncertainty.")
-        .def_readonly("used", &RoundedChannel::used, "Standard uncertainty in its place.")
-        .def_readonly("step", &RoundedChannel::step, "Of the decimals; 0: more of them than count.")
-        .def_property_readonly(
-            "cause", [](const RoundedChannel& rounded) { return name(rounded.cause); },
+    bind_record(
+        m, "RoundedChannel",
+        "What took the place of a channel's stated uncertainties, which were too small; mm or "
+        "rad.",
+        field("channel", &RoundedChannel::channel, "\"distance\", ..."),
+        field("stated", &RoundedChannel::stated, "Standard uncertainty."),
+        field("used", &RoundedChannel::used, "Standard uncertainty in its place."),
+        field("step", &RoundedChannel::step, "Of the decimals; 0: more of them than count."),
+        field(
+            "cause", &RoundedChannel::cause,
             "\"doubles\": rounding of numbers; \"decimals\": of the file; \"weights\": tilts or the laser are known so "
-            "much worse that double precision could not weigh both.");
+            "much worse that double precision could not weigh both."));
 
-    py::class_<DriftEstimate>(m, "DriftEstimate", "A rate of the machine's drift as it was found, mm/s or mm/K.")
-        .def_readonly("axis", &DriftEstimate::axis, "0, 1, 2 of X, Y, Z.")
-        .def_readonly("value", &DriftEstimate::value, "mm/s")
-        .def_readonly("standard_uncertainty", &DriftEstimate::standard_uncertainty, "mm/s")
-        .def_readonly("prior", &DriftEstimate::prior, "Standard uncertainty of its prior.");
+    bind_record(m, "DriftEstimate", "A rate of the machine's drift as it was found, mm/s or mm/K.",
+                field("axis", &DriftEstimate::axis, "0, 1, 2 of X, Y, Z."),
+                field("value", &DriftEstimate::value, "mm/s"),
+                field("standard_uncertainty", &DriftEstimate::standard_uncertainty, "mm/s"),
+                field("prior", &DriftEstimate::prior, "Standard uncertainty of its prior."));
 
-    py::class_<VarianceComponent>(m, "VarianceComponent",
-                                  "How much the readings of a channel scatter, as their residuals tell it.")
+    bind_record(
+        m, "VarianceComponent", "How much the readings of a channel scatter, as their residuals tell it.",
+        field("standard_uncertainty", &VarianceComponent::standard_uncertainty, "Of the factor."),
+        field("used", &VarianceComponent::used, "Stated uncertainties were multiplied by it; otherwise they stayed."))
         .def_property_readonly(
             "channel", [](const VarianceComponent& c) { return c.noise.channel; },
             "\"distance\" (of beams, too), \"alpha\", ...")
@@ -309,53 +279,47 @@ void bind_result(py::module_& m) {
             "Of a line that scatters unlike the channel's others; empty: all others.")
         .def_property_readonly(
             "factor", [](const VarianceComponent& c) { return c.noise.factor; },
-            "Root of the component: times the noise that is stated.")
-        .def_readonly("standard_uncertainty", &VarianceComponent::standard_uncertainty, "Of the factor.")
-        .def_readonly("used", &VarianceComponent::used,
-                      "Stated uncertainties were multiplied by it; otherwise they stayed.");
+            "Root of the component: times the noise that is stated.");
 
-    py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
-        .def_readonly("row", &Outlier::row, "Row of the measurement, from 0.")
-        .def_readonly("run", &Outlier::run, "Of the line, from 0.")
-        .def_readonly("line", &Outlier::line, "Such as \"ppp\".")
-        .def_readonly("point", &Outlier::point, "On the line, from 0.")
-        .def_readonly("channel", &Outlier::channel, "\"distance\", ...")
-        .def_readonly("residual", &Outlier::residual, "mm or rad")
-        .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.")
-        .def_readonly("number", &Outlier::number, "Of its class in Adjustment.faults, from 1.");
+    bind_record(
+        m, "Outlier", "A reading that was left out.", field("row", &Outlier::row, "Row of the measurement, from 0."),
+        field("run", &Outlier::run, "Of the line, from 0."), field("line", &Outlier::line, "Such as \"ppp\"."),
+        field("point", &Outlier::point, "On the line, from 0."),
+        field("channel", &Outlier::channel, "\"distance\", ..."), field("residual", &Outlier::residual, "mm or rad"),
+        field("normalised", &Outlier::normalised, "In its standard uncertainties."),
+        field("number", &Outlier::number, "Of its class in Adjustment.faults, from 1."));
 
-    py::class_<Fault>(m, "Fault", "A fault that explains the readings, if it is the one.")
-        .def_property_readonly(
-            "kind", [](const Fault& f) { return name(f.kind); },
-            "\"reading\", \"slip\": an offset of its channel from this reading on, or \"factor\": distances of its "
-            "line "
-            "too long by a part of the travel.")
-        .def_readonly("row", &Fault::row, "Row of the measurement, from 0.")
-        .def_readonly("run", &Fault::run, "Of the line, from 0.")
-        .def_readonly("line", &Fault::line, "Such as \"ppp\".")
-        .def_readonly("point", &Fault::point, "On the line, from 0.")
-        .def_readonly("channel", &Fault::channel, "\"distance\", ...")
-        .def_readonly("size", &Fault::size, "What was read too much, mm or rad.")
-        .def_readonly("standard_uncertainty", &Fault::standard_uncertainty, "Of the size.")
-        .def_readonly("chi_square_gain", &Fault::chi_square_gain, "What it takes off chi-square.");
-    py::class_<FaultClass>(m, "FaultClass", "Faults of which the readings do not tell which one happened.")
-        .def_readonly("members", &FaultClass::members, "The best first.")
-        .def_property_readonly(
-            "treatment", [](const FaultClass& c) { return name(c.treatment); },
-            "\"left_out\": all readings that may be the wrong one; \"estimated\": their sizes are unknowns, which "
-            "share "
-            "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\".")
-        .def_readonly("corrected", &FaultClass::corrected,
-                      "Whether the verdict is that of the fit after its treatment.")
-        .def_property_readonly("distinguished", &FaultClass::is_distinguished, "Whether the readings determine which one it was.")
-        .def_readonly("widest", &FaultClass::widest,
-                      "The parameter that estimated alternatives differ in most; empty where there are none.")
-        .def_readonly("spread", &FaultClass::spread, "By how much they differ in it, mm or rad.")
-        .def_readonly("plausible", &FaultClass::plausible, "The plausible limit of that parameter.");
+    bind_record(
+        m, "Fault", "A fault that explains the readings, if it is the one.",
+        field("kind", &Fault::kind,
+              "\"reading\", \"slip\": an offset of its channel from this reading on, or \"factor\": distances of its "
+              "line "
+              "too long by a part of the travel."),
+        field("row", &Fault::row, "Row of the measurement, from 0."), field("run", &Fault::run, "Of the line, from 0."),
+        field("line", &Fault::line, "Such as \"ppp\"."), field("point", &Fault::point, "On the line, from 0."),
+        field("channel", &Fault::channel, "\"distance\", ..."),
+        field("size", &Fault::size, "What was read too much, mm or rad."),
+        field("standard_uncertainty", &Fault::standard_uncertainty, "Of the size."),
+        field("chi_square_gain", &Fault::chi_square_gain, "What it takes off chi-square."));
+    bind_record(
+        m, "FaultClass", "Faults of which the readings do not tell which one happened.",
+        field("members", &FaultClass::members, "The best first."),
+        field("treatment", &FaultClass::treatment,
+              "\"left_out\": all readings that may be the wrong one; \"estimated\": their sizes are unknowns, which "
+              "share "
+              "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\"."),
+        field("corrected", &FaultClass::corrected, "Whether the verdict is that of the fit after its treatment."),
+        field("widest", &FaultClass::widest,
+              "The parameter that estimated alternatives differ in most; empty where there are none."),
+        field("spread", &FaultClass::spread, "By how much they differ in it, mm or rad."),
+        field("plausible", &FaultClass::plausible, "The plausible limit of that parameter."))
+        .def_property_readonly("distinguished", &FaultClass::is_distinguished,
+                               "Whether the readings determine which one it was.");
 
-    py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted, or what its residuals have in common.")
-        .def_property_readonly(
-            "finding", [](const FitReason& r) { return name(r.finding); },
+    bind_record(
+        m, "FitReason", "Why a fit is not accepted, or what its residuals have in common.",
+        field(
+            "finding", &FitReason::finding,
             "\"no_redundancy\"; \"no_noise\": rms of the residuals in units of their rounding; \"noise_factor\", "
             "\"misfit\", \"no_misfit\": root of the variance factor, or the noise factor of `channel` on `line`, not "
             "credible, or larger or smaller than chance explains; \"uneven_misfit\": noise factor of one group of "
@@ -367,41 +331,41 @@ void bind_result(py::module_& m) {
             "\"alternatives\": by how much alternative faults differ in `parameter`; \"scaled\": what the "
             "uncertainties were multiplied by; \"mistake\": `parameter` "
             "says which one would explain the readings; \"implausible_input\": `parameter` says what no workshop "
-            "has.")
-        .def_readonly("value", &FitReason::value, "Of a trend mm or rad.")
-        .def_readonly(
-            "limit", &FitReason::limit,
-            "Of an uneven misfit the value of the other readings; of noise, trends and scatter what is expected.")
-        .def_readonly("standard_uncertainty", &FitReason::standard_uncertainty,
-                      "Of the value of a misfit, no_misfit, trend, scaled; else 0.")
-        .def_readonly("line", &FitReason::line, "Of an uneven misfit, a trend or a prior; empty: all.")
-        .def_readonly("channel", &FitReason::channel,
-                      "Of an uneven misfit or a trend; empty: all. Of a prior or prior_scatter the set-up quantity.")
-        .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
-        .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
-        .def_readonly("parameter", &FitReason::parameter,
-                      "Of alternatives; of a mistake or an input its sentence; else empty.")
-        .def_readonly("run", &FitReason::run, "Of an uneven misfit: the run; -1: all.")
-        .def_property_readonly(
-            "aspect", [](const FitReason& r) { return name(r.aspect); },
-            "Of an uneven misfit \"second_half\" of the run or \"far_half\" of the lines; of a trend what it runs "
-            "with: \"time\" (the order of the rows, where there is no time), \"position\" along the line, "
-            "\"time_or_position\", which are alike in this run; else empty.")
-        .def_readonly("alternative", &FitReason::alternative,
-                      "Of a trend: it is there instead of the one before; the readings do not tell which.");
-    py::class_<Verdict>(
-        m, "Verdict",
-        "Whether the readings of an adjustment agree with each other, with their uncertainties and with "
-        "the priors. It does not see what the parameters absorb: a wrong wavelength, tool or place of b in the "
-        "chain.")
-        .def_property_readonly(
-            "fit", [](const Verdict& v) { return name(v.fit); },
-            "\"accepted\", \"doubtful\", \"rejected\" or \"unchecked\".")
-        .def_readonly("reasons", &Verdict::reasons, "A FitReason for each; empty of an accepted fit without remarks.");
+            "has."),
+        field("value", &FitReason::value, "Of a trend mm or rad."),
+        field("limit", &FitReason::limit,
+              "Of an uneven misfit the value of the other readings; of noise, trends and scatter what is expected."),
+        field("standard_uncertainty", &FitReason::standard_uncertainty,
+              "Of the value of a misfit, no_misfit, trend, scaled; else 0."),
+        field("line", &FitReason::line, "Of an uneven misfit, a trend or a prior; empty: all."),
+        field("channel", &FitReason::channel,
+              "Of an uneven misfit or a trend; empty: all. Of a prior or prior_scatter the set-up quantity."),
+        field("component", &FitReason::component, "Of a prior: as of SetupEstimate."),
+        field("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0."),
+        field("parameter", &FitReason::parameter,
+              "Of alternatives; of a mistake or an input its sentence; else empty."),
+        field("run", &FitReason::run, "Of an uneven misfit: the run; -1: all."),
+        field("aspect", &FitReason::aspect,
+              "Of an uneven misfit \"second_half\" of the run or \"far_half\" of the lines; of a trend what it runs "
+              "with: \"time\" (the order of the rows, where there is no time), \"position\" along the line, "
+              "\"time_or_position\", which are alike in this run; else empty."),
+        field("alternative", &FitReason::alternative,
+              "Of a trend: it is there instead of the one before; the readings do not tell which."));
+    bind_record(m, "Verdict",
+                "Whether the readings of an adjustment agree with each other, with their uncertainties and with "
+                "the priors. It does not see what the parameters absorb: a wrong wavelength, tool or place of b in the "
+                "chain.",
+                field("fit", &Verdict::fit, "\"accepted\", \"doubtful\", \"rejected\" or \"unchecked\"."),
+                field("reasons", &Verdict::reasons, "A FitReason for each; empty of an accepted fit without remarks."));
 
-    py::class_<KnownCombination>(m, "KnownCombination",
-                                 "A sum of unknowns that are not determined one by one: of slopes of positioning "
-                                 "errors and straightnesses, or of two unknowns of one set-up.")
+    bind_record(m, "KnownCombination",
+                "A sum of unknowns that are not determined one by one: of slopes of positioning "
+                "errors and straightnesses, or of two unknowns of one set-up.",
+                field("component", &KnownCombination::component, "Of a set-up: as in SetupEstimate."),
+                field("run", &KnownCombination::run, "Of a set-up: the first run that has it."),
+                field("line", &KnownCombination::line, "Of a set-up; empty for slopes."),
+                field("value", &KnownCombination::value, "rad; of slopes mm/mm."),
+                field("standard_uncertainty", &KnownCombination::standard_uncertainty, "rad; of slopes mm/mm."))
         .def_property_readonly(
             "terms",
             [](const KnownCombination& c) {
@@ -409,12 +373,7 @@ void bind_result(py::module_& m) {
                 for (const auto& term : c.terms) terms.emplace_back(term.weight, term.parameter);
                 return terms;
             },
-            "(weight, parameter) each; of a set-up its quantities, as in SetupEstimate.")
-        .def_readonly("component", &KnownCombination::component, "Of a set-up: as in SetupEstimate.")
-        .def_readonly("run", &KnownCombination::run, "Of a set-up: the first run that has it.")
-        .def_readonly("line", &KnownCombination::line, "Of a set-up; empty for slopes.")
-        .def_readonly("value", &KnownCombination::value, "rad; of slopes mm/mm.")
-        .def_readonly("standard_uncertainty", &KnownCombination::standard_uncertainty, "rad; of slopes mm/mm.");
+            "(weight, parameter) each; of a set-up its quantities, as in SetupEstimate.");
 
     const auto by_family = [](double FaultControl::Effect::* effect) {
         return [effect](const FaultControl& c) {
@@ -424,23 +383,23 @@ void bind_result(py::module_& m) {
                                                  {"squareness", c.squareness.*effect}};
         };
     };
-    py::class_<FaultControl>(
+    bind_record(
         m, "FaultControl",
         "Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found "
         "with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of "
         "its size, and distinguished from another one where that makes chi-square larger by 25. Twins are "
         "not distinguished at any size: their effects have a correlation of 0.999 and more, but the calibration "
-        "differs.")
-        .def_property_readonly(
-            "kind", [](const FaultControl& c) { return name(c.kind); },
-            "\"reading\", \"slip\": an offset of its channel from a reading on, or \"factor\" on a line's distances.")
-        .def_readonly("channel", &FaultControl::channel, "\"distance\", \"tilt\" or \"spot\".")
-        .def_readonly("count", &FaultControl::count, "Of controlled faults, one a place (of long runs: evenly spaced).")
-        .def_readonly("uncontrolled", &FaultControl::uncontrolled, "More of them, which no other reading controls.")
-        .def_readonly("twins", &FaultControl::twins, "Those of `count` that have a twin.")
-        .def_readonly("found_from", &FaultControl::found_from, "All of `count` are found from here on; mm or rad.")
-        .def_readonly("distinguished_from", &FaultControl::distinguished_from,
-                      "Those without a twin are distinguished from all others from this size on; mm or rad.")
+        "differs.",
+        field(
+            "kind", &FaultControl::kind,
+            "\"reading\", \"slip\": an offset of its channel from a reading on, or \"factor\" on a line's distances."),
+        field("channel", &FaultControl::channel, "\"distance\", \"tilt\" or \"spot\"."),
+        field("count", &FaultControl::count, "Of controlled faults, one a place (of long runs: evenly spaced)."),
+        field("uncontrolled", &FaultControl::uncontrolled, "More of them, which no other reading controls."),
+        field("twins", &FaultControl::twins, "Those of `count` that have a twin."),
+        field("found_from", &FaultControl::found_from, "All of `count` are found from here on; mm or rad."),
+        field("distinguished_from", &FaultControl::distinguished_from,
+              "Those without a twin are distinguished from all others from this size on; mm or rad."))
         .def_property_readonly("hidden", by_family(&FaultControl::Effect::hidden),
                                "Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of "
                                "one that nothing controls.")
@@ -448,15 +407,14 @@ void bind_result(py::module_& m) {
                                "Kind of parameter -> by how much it differs, by the size of a fault, if its twin was "
                                "it; in mm or rad each.");
 
-    py::class_<UnseenFault>(
+    bind_record(
         m, "UnseenFault",
-        "What the faults of one kind may do to a calibration without being seen, one at a time: the worst of them.")
-        .def_property_readonly(
-            "kind", [](const UnseenFault& f) { return name(f.kind); }, "As of FaultControl.")
-        .def_readonly("channel", &UnseenFault::channel, "\"distance\", \"tilt\" or \"spot\".")
-        .def_readonly("size", &UnseenFault::size,
-                      "From here on all that are controlled are found with 99 %; mm or rad; 0: none is controlled.")
-        .def_readonly("controlled", &UnseenFault::controlled, "Whether all are; otherwise some may have any size.")
+        "What the faults of one kind may do to a calibration without being seen, one at a time: the worst of them.",
+        field("kind", &UnseenFault::kind, "As of FaultControl."),
+        field("channel", &UnseenFault::channel, "\"distance\", \"tilt\" or \"spot\"."),
+        field("size", &UnseenFault::size,
+              "From here on all that are controlled are found with 99 %; mm or rad; 0: none is controlled."),
+        field("controlled", &UnseenFault::controlled, "Whether all are; otherwise some may have any size."))
         .def_property_readonly(
             "hidden",
             [](const UnseenFault& f) {
@@ -601,7 +559,7 @@ std::optional<FitQuality> fit_quality_of_run(const Measurement& measurement, con
 
 void bind_adjustment(py::module_& m) {
     bind_thresholds(m);
-    bind_options(m);
+    bind_adjustment_options(m);
     bind_result(m);
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
@@ -618,9 +576,9 @@ void bind_adjustment(py::module_& m) {
         py::arg("implausible_inputs") = std::vector<std::string>{},
         "The same, rejected where a mistake would explain the readings; at best doubtful where there are inputs that "
         "no workshop has, a sentence each.");
-    py::class_<FitQuality>(m, "FitQuality", "How well a run fits, and nothing else.")
-        .def_readonly("weighted_square_sum", &FitQuality::weighted_square_sum)
-        .def_readonly("degrees_of_freedom", &FitQuality::degrees_of_freedom);
+    bind_record(m, "FitQuality", "How well a run fits, and nothing else.",
+                field("weighted_square_sum", &FitQuality::weighted_square_sum),
+                field("degrees_of_freedom", &FitQuality::degrees_of_freedom));
     m.def("fit_quality", &fit_quality_of_run, py::arg("measurement"), py::arg("plan"), py::arg("head"),
           py::arg("chain"), py::arg("tool"), py::arg("options"), py::arg("most_steps"),
           "How well a run fits, without search for faults and without uncertainties, in a tenth of the time of adjust: "

@@ -7,6 +7,7 @@
 
 #include "batch_options.hpp"
 #include "stepdiag/core/random_blocks.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -122,9 +123,9 @@ BatchOptions to_batch_options(const std::string& method, const AdjustmentOptions
 }
 
 void bind_batch(py::module_& m) {
-    py::class_<CalibrationEntry>(m, "CalibrationEntry", "A value of a calibration's tables.")
-        .def_readonly("parameter", &CalibrationEntry::parameter, "\"EXX\", ..., \"C0Y\"")
-        .def_readonly("position", &CalibrationEntry::position, "mm; NaN for a squareness")
+    bind_record(m, "CalibrationEntry", "A value of a calibration's tables.",
+                field("parameter", &CalibrationEntry::parameter, "\"EXX\", ..., \"C0Y\""),
+                field("position", &CalibrationEntry::position, "mm; NaN for a squareness"))
         .def("__repr__", [](const CalibrationEntry& e) {
             return "CalibrationEntry(" + e.parameter +
                    (std::isnan(e.position) ? "" : ", " + std::string(py::str(py::float_(e.position))) + " mm") + ")";

@@ -61,8 +61,8 @@ Calibration make_calibration(
     const Names& undetermined_slopes, const Names& undetermined, const std::optional<ArrayLike>& covariance,
     const Tables& reversal, const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
     const std::string& date, const std::optional<std::string>& fit, const std::optional<double>& variance_factor,
-    const Names& fit_codes, const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
-    const Names& unseen_faults, const Names& conditions, const std::string& budget,
+    const Names& fit_codes, const Names& fit_reasons, const std::optional<double>& uncertainty_scaled,
+    const Texts& provenance, const Names& unseen_faults, const Names& conditions, const std::string& budget,
     const std::optional<double>& between_nodes, const std::optional<double>& temperature_reference,
     const std::optional<ArrayLike>& temperature_as_found, const std::optional<ArrayLike>& expansion,
     const std::optional<ArrayLike>& fixed_point, bool unverified) {
@@ -132,11 +132,12 @@ void bind_calibration(py::module_& m) {
              py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
-             py::arg("fit_codes") = Names{}, py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
-             py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{}, py::arg("conditions") = Names{},
-             py::arg("budget") = "", py::arg("between_nodes") = std::nullopt,
-             py::arg("temperature_reference") = std::nullopt, py::arg("temperature_as_found") = std::nullopt,
-             py::arg("expansion") = std::nullopt, py::arg("fixed_point") = std::nullopt, py::arg("unverified") = false,
+             py::arg("fit_codes") = Names{}, py::arg("fit_reasons") = Names{},
+             py::arg("uncertainty_scaled") = std::nullopt, py::arg("provenance") = Texts{},
+             py::arg("unseen_faults") = Names{}, py::arg("conditions") = Names{}, py::arg("budget") = "",
+             py::arg("between_nodes") = std::nullopt, py::arg("temperature_reference") = std::nullopt,
+             py::arg("temperature_as_found") = std::nullopt, py::arg("expansion") = std::nullopt,
+             py::arg("fixed_point") = std::nullopt, py::arg("unverified") = false,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "

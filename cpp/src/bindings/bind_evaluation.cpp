@@ -3,6 +3,7 @@
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 #include "stepdiag/evaluation/plausibility.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 
@@ -13,6 +14,14 @@ std::vector<std::string> names_of() {
     std::vector<std::string> names;
     for (int i = 0; i < count; ++i) names.push_back(name(Enum(i)));
     return names;
+}
+
+void check_usable(const ReadingUncertainty& uncertainty) {
+    for (const auto& [key, u] : {std::pair("distance", uncertainty.distance), std::pair("tilt", uncertainty.tilt),
+                                 std::pair("spot", uncertainty.spot)})
+        if (!is_usable_uncertainty(u))
+            throw InvalidArgument(std::string("uncertainty ") + key +
+                                  ": expected a standard uncertainty of 1e-12 to 1e6 mm or rad");
 }
 
 // By a linear method; the adjustment has a function of its own.
@@ -30,20 +39,27 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
     const py::gil_scoped_release release;
-    return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible, expansion});
+    return evaluator(measurement, plan, kinematics, offset, heads,
+                     {uncertainty, full_covariance, plausible, expansion});
 }
 
 void bind_undetermined(py::module_& m) {
-    py::class_<Undetermined>(m, "Undetermined",
-                             "What the readings leave open, as data; `Calibration.undetermined` has it in words.")
-        .def_property_readonly(
-            "part", [](const Undetermined& u) { return name(u.part); },
-            "What is open: \"whole\"; \"slope\"; \"positions\": at some of them; \"reversal\"; "
-            "\"reversal_at_home\": of the reversal errors only the change along the axis is known; \"setup\".")
-        .def_readonly("parameters", &Undetermined::parameters,
-                      "\"EXX\", ..., \"C0Y\"; of a set-up its quantity, as in SetupEstimate.")
-        .def_property_readonly(
-            "reason", [](const Undetermined& u) { return name(u.reason); }, "One of `reasons()`.")
+    bind_record(
+        m, "Undetermined", "What the readings leave open, as data; `Calibration.undetermined` has it in words.",
+        field("part", &Undetermined::part,
+              "What is open: \"whole\"; \"slope\"; \"positions\": at some of them; \"reversal\"; "
+              "\"reversal_at_home\": of the reversal errors only the change along the axis is known; \"setup\"."),
+        field("parameters", &Undetermined::parameters,
+              "\"EXX\", ..., \"C0Y\"; of a set-up its quantity, as in SetupEstimate."),
+        field("reason", &Undetermined::reason, "One of `reasons()`."),
+        field("positions", &Undetermined::positions,
+              "mm: where it is open; of a step that was read on too few lines its two ends."),
+        field("step", &Undetermined::step, "Of such a step: its number, from 1; else 0."),
+        field("lines_read", &Undetermined::lines_read, "Of such a step: the lines that it was read on."),
+        field("lines_planned", &Undetermined::lines_planned, "Of such a step: its lines in the plan."),
+        field("line", &Undetermined::line, "The line to add; else empty."),
+        field("component", &Undetermined::component, "Of a set-up: as in SetupEstimate."),
+        field("setups", &Undetermined::setups, "Of a set-up: (first run, line) of each that is open."))
         .def_property_readonly(
             "remedies",
             [](const Undetermined& u) {
@@ -52,14 +68,6 @@ void bind_undetermined(py::module_& m) {
                 return names;
             },
             "What would help, the best first; any one of them does. Of `all_remedies()`.")
-        .def_readonly("positions", &Undetermined::positions,
-                      "mm: where it is open; of a step that was read on too few lines its two ends.")
-        .def_readonly("step", &Undetermined::step, "Of such a step: its number, from 1; else 0.")
-        .def_readonly("lines_read", &Undetermined::lines_read, "Of such a step: the lines that it was read on.")
-        .def_readonly("lines_planned", &Undetermined::lines_planned, "Of such a step: its lines in the plan.")
-        .def_readonly("line", &Undetermined::line, "The line to add; else empty.")
-        .def_readonly("component", &Undetermined::component, "Of a set-up: as in SetupEstimate.")
-        .def_readonly("setups", &Undetermined::setups, "Of a set-up: (first run, line) of each that is open.")
         .def_static("reasons", &names_of<OpenReason, open_reason_count>)
         .def_static("all_remedies", &names_of<Remedy, remedy_count>);
 }
@@ -77,83 +85,42 @@ std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(con
 }  // namespace
 
 void bind_evaluation(py::module_& m) {
-    py::class_<KnownExpansion>(
+    bind_options<KnownExpansion, 2>(
         m, "KnownExpansion",
         "What is known of the expansion of the scales. With it, positioning errors are referred to the reference "
-        "temperature, by the temperatures in the run's channels.")
-        .def(
-            py::init([](const Expansion& expansion, const ArrayLike& standard_uncertainty, bool one_coefficient,
-                        double sensor_uncertainty, const std::optional<ArrayLike>& temperature, bool one_temperature) {
-                KnownExpansion known{expansion, to_vector3(standard_uncertainty, "standard_uncertainty"),
-                                     one_coefficient, sensor_uncertainty};
-                if (temperature) known.temperature = to_vector3(*temperature, "temperature");
-                known.one_temperature = one_temperature;
-                check(known);
-                return known;
-            }),
-            py::arg("expansion"), py::arg("standard_uncertainty"), py::kw_only(), py::arg("one_coefficient"),
-            py::arg("sensor_uncertainty"), py::arg("temperature") = std::nullopt, py::arg("one_temperature") = false,
-            "standard_uncertainty (3,): of the coefficients, 1/K; one_coefficient: it is common to the axes; "
-            "sensor_uncertainty: of each sensor's constant deviation, K; temperature (3,): of the scales where the run "
-            "says nothing, degrees Celsius, and whether one sensor measured it. Raises InvalidArgument.")
-        .def_readonly("expansion", &KnownExpansion::expansion)
-        .def_property_readonly("standard_uncertainty",
-                               [](const KnownExpansion& k) { return to_numpy_vector(k.standard_uncertainty); })
-        .def_readonly("one_coefficient", &KnownExpansion::one_coefficient)
-        .def_readonly("sensor_uncertainty", &KnownExpansion::sensor_uncertainty)
-        .def_property_readonly("temperature",
-                               [](const KnownExpansion& k) {
-                                   return k.temperature ? std::optional(to_numpy_vector(*k.temperature)) : std::nullopt;
-                               })
-        .def_readonly("one_temperature", &KnownExpansion::one_temperature,
-                      "Whether one sensor measured it for all axes.");
+        "temperature, by the temperatures in the run's channels.",
+        &check, required("expansion", &KnownExpansion::expansion, "Of the scales."),
+        required("standard_uncertainty", &KnownExpansion::standard_uncertainty, "(3,) of the coefficients, 1/K"),
+        required("one_coefficient", &KnownExpansion::one_coefficient, "Whether it is common to the axes."),
+        required("sensor_uncertainty", &KnownExpansion::sensor_uncertainty,
+                 "Standard uncertainty of each sensor's constant deviation, K."),
+        field("temperature", &KnownExpansion::temperature,
+              "(3,) of the scales where the run says nothing, degrees Celsius"),
+        field("one_temperature", &KnownExpansion::one_temperature, "Whether one sensor measured it for all axes."));
 
-    py::class_<ReadingUncertainty>(m, "ReadingUncertainty",
-                                   "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
-                                   "...), tilt (rad), spot (mm).")
-        .def(py::init([](double distance, double tilt, double spot) {
-                 for (const auto& [key, u] :
-                      {std::pair("distance", distance), std::pair("tilt", tilt), std::pair("spot", spot)})
-                     if (!is_usable_uncertainty(u))
-                         throw InvalidArgument(std::string("uncertainty ") + key +
-                                               ": expected a standard uncertainty of 1e-12 to 1e6 mm or rad");
-                 return ReadingUncertainty{distance, tilt, spot};
-             }),
-             py::arg("distance") = ReadingUncertainty{}.distance, py::arg("tilt") = ReadingUncertainty{}.tilt,
-             py::arg("spot") = ReadingUncertainty{}.spot, "Raises InvalidArgument for what is not within 1e-12 .. 1e6.")
-        .def_readonly("distance", &ReadingUncertainty::distance)
-        .def_readonly("tilt", &ReadingUncertainty::tilt)
-        .def_readonly("spot", &ReadingUncertainty::spot);
+    bind_options<ReadingUncertainty, 3>(
+        m, "ReadingUncertainty", "Standard uncertainty of a reading where the run gives none: 1e-12 to 1e6 each.",
+        &check_usable, field("distance", &ReadingUncertainty::distance, "mm; also of d1, ..."),
+        field("tilt", &ReadingUncertainty::tilt, "rad"), field("spot", &ReadingUncertainty::spot, "mm"));
 
-    py::class_<PlausibleLimits>(
-        m, "PlausibleLimits",
-        "What a machine can be: positioning errors by the travel of their axis, positioning "
-        "errors and straightnesses (translation, mm), angular errors and squarenesses (rotation, "
-        "rad). A result beyond is an error; inf: no limit.")
-        .def(py::init([](double positioning, double translation, double rotation) {
-                 const PlausibleLimits limits{positioning, translation, rotation};
-                 check(limits);
-                 return limits;
-             }),
-             py::kw_only(), py::arg("positioning") = PlausibleLimits{}.positioning,
-             py::arg("translation") = PlausibleLimits{}.translation, py::arg("rotation") = PlausibleLimits{}.rotation,
-             "Raises InvalidArgument for limits that are not positive.")
-        .def_readonly("positioning", &PlausibleLimits::positioning)
-        .def_readonly("translation", &PlausibleLimits::translation)
-        .def_readonly("rotation", &PlausibleLimits::rotation);
+    bind_options<PlausibleLimits>(
+        m, "PlausibleLimits", "What a machine can be. A result beyond is an error; inf: no limit.", &check,
+        field("positioning", &PlausibleLimits::positioning, "Positioning errors by the travel of their axis."),
+        field("translation", &PlausibleLimits::translation, "Positioning errors and straightnesses, mm."),
+        field("rotation", &PlausibleLimits::rotation, "Angular errors and squarenesses, rad."));
 
     bind_undetermined(m);
-    py::class_<Calibration>(
+    bind_record(
         m, "Calibration",
-        "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).")
-        .def_readonly("method", &Calibration::method,
-                      "\"conventional\", \"enhanced\" or \"adjustment\", perhaps with remarks.")
-        .def_readonly("chain", &Calibration::chain, "Of the machine.")
-        .def_property_readonly(
-            "volume", [](const Calibration& c) { return to_numpy_vector(c.volume); }, "(3,) edges, mm")
-        .def_property_readonly(
-            "tool", [](const Calibration& c) { return to_numpy_vector(c.tool); },
-            "(3,) offset of the functional point, mm")
+        "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).",
+        field("method", &Calibration::method,
+              "\"conventional\", \"enhanced\" or \"adjustment\", perhaps with remarks."),
+        field("chain", &Calibration::chain, "Of the machine."), field("volume", &Calibration::volume, "(3,) edges, mm"),
+        field("tool", &Calibration::tool, "(3,) offset of the functional point, mm"),
+        field("findings", &Calibration::findings,
+              "What the readings do not determine, why, and what would help; files keep it in words only."),
+        field("undetermined", &Calibration::undetermined,
+              "The findings in words, one sentence each; empty until they are put in (with_sentences)."))
         .def_property_readonly(
             "functions",
             [](const Calibration& c) {
@@ -218,10 +185,6 @@ void bind_evaluation(py::module_& m) {
                 return names;
             },
             "Functions of whose reversal error only the change from home is known; its values are 0 at home.")
-        .def_readonly("findings", &Calibration::findings,
-                      "What the readings do not determine, why, and what would help; files keep it in words only.")
-        .def_readonly("undetermined", &Calibration::undetermined,
-                      "The findings in words, one sentence each; empty until they are put in (with_sentences).")
         .def_property_readonly(
             "covariance",
             [](const Calibration& c) {

@@ -10,17 +10,26 @@
 #include "stepdiag/head/sensitivity.hpp"
 #include "stepdiag/head/spot_sensor.hpp"
 #include "stepdiag/head/traced_reading.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
+
+template <>
+ReadingModel parsed<ReadingModel>(const std::string& word) {
+    return parse_reading_model(word);
+}
+
 namespace {
 
 void bind_beam(py::module_& m) {
     const auto position = py::arg("position") = zeros(3);
     const auto rotation = py::arg("rotation") = zeros(3);
     const Interferometer standard;
-    py::class_<HeadBeam>(m, "HeadBeam",
-                         "A light source of a head, its beam along +z of its own frame. Lengths in mm, wavelength (in "
-                         "vacuum) in nm, rotation vector in rad.")
+    bind_record(m, "HeadBeam",
+                "A light source of a head, its beam along +z of its own frame. Lengths in mm, wavelength (in "
+                "vacuum) in nm, rotation vector in rad.",
+                field("name", &HeadBeam::name, "As the description has it."),
+                field("sensor", &HeadBeam::sensor, "Name of the sensor it comes to; empty of an interferometer."))
         .def_static(
             "interferometer",
             [](const std::string& name, const ArrayLike& place, const ArrayLike& turn, double wavelength,
@@ -54,8 +63,6 @@ void bind_beam(py::module_& m) {
             py::arg("waist_radius") = 0.8, py::arg("waist_position") = 0.0, py::arg("housing") = HeadBeam{}.housing,
             "A conventional laser whose beam comes to a sensor; `housing`: edge of the square around it that stops "
             "light.")
-        .def_readonly("name", &HeadBeam::name, "As the description has it.")
-        .def_readonly("sensor", &HeadBeam::sensor, "Name of the sensor it comes to; empty of an interferometer.")
         .def_property_readonly(
             "is_interferometer", [](const HeadBeam& b) { return b.interferometer.has_value(); },
             "Otherwise it is a laser to a sensor.")
@@ -133,7 +140,6 @@ Placement to_placement(const ArrayLike& position, const ArrayLike& rotation) {
 
 namespace {
 
-const Interferometer no_interferometer;
 const Camera no_camera;
 const LateralEffect no_device;
 
@@ -148,16 +154,12 @@ double to_index(double index, const char* name) {
     return index;
 }
 
-ReturnedBeam make_returned_beam(const ArrayLike& position, const ArrayLike& direction, double optical_length,
-                                double reduced_length) {
-    const ReturnedBeam beam{to_vector2(position, "position"), to_vector3(direction, "direction"), optical_length,
-                            reduced_length};
+void check_returned(const ReturnedBeam& beam) {
     if (!beam.position.allFinite()) throw InvalidArgument("position: expected two finite lengths in mm");
     if (!(std::abs(beam.direction.norm() - 1.0) < 1e-6 && beam.direction.z() < 0.0))
         throw InvalidArgument("direction: expected a unit vector that comes back, z < 0");
-    if (!std::isfinite(optical_length)) throw InvalidArgument("optical_length: expected a finite length in mm");
-    if (!std::isfinite(reduced_length)) throw InvalidArgument("reduced_length: expected a finite length in mm");
-    return beam;
+    if (!std::isfinite(beam.optical_length)) throw InvalidArgument("optical_length: expected a finite length in mm");
+    if (!std::isfinite(beam.reduced_length)) throw InvalidArgument("reduced_length: expected a finite length in mm");
 }
 
 Eigen::MatrixXd to_image(const ArrayLike& object) {
@@ -176,63 +178,32 @@ std::optional<DoubleArray> to_position(const std::optional<Eigen::Vector2d>& pos
 }
 
 void bind_interferometer(py::module_& m) {
-    py::class_<GaussianMode>(m, "GaussianMode",
-                             "A collimator's Gaussian mode: vacuum wavelength in nm, waist radius (1/e^2 of power) and "
-                             "the waist's place along the beam from the collimator's plane (t/n) in mm.")
-        .def(py::init([](double wavelength, double waist_radius, double waist_position) {
-                 const GaussianMode mode{wavelength, waist_radius, waist_position};
-                 check_gaussian_mode(mode);
-                 return mode;
-             }),
-             py::arg("wavelength"), py::arg("waist_radius"), py::arg("waist_position") = 0.0,
-             "Raises InvalidArgument for what is not positive or not finite.")
-        .def_readonly("wavelength", &GaussianMode::wavelength)
-        .def_readonly("waist_radius", &GaussianMode::waist_radius, "1/e^2 of power, mm")
-        .def_readonly("waist_position", &GaussianMode::waist_position, "Along the beam from its source, mm.")
+    bind_options<GaussianMode, 3>(m, "GaussianMode", "A collimator's Gaussian mode.", &check_gaussian_mode,
+                                  required("wavelength", &GaussianMode::wavelength, "In vacuum, nm."),
+                                  required("waist_radius", &GaussianMode::waist_radius, "1/e^2 of power, mm"),
+                                  field("waist_position", &GaussianMode::waist_position,
+                                        "Along the beam from the collimator's plane, reduced (t/n), mm."))
         .def_property_readonly("rayleigh_length", &rayleigh_length, "pi w0^2 / wavelength, mm (reduced: t/n).");
 
-    py::class_<ReturnedBeam>(
-        m, "ReturnedBeam", "A beam that has come back, in the collimator's frame (beam out along +z, its plane z = 0).")
-        .def(py::init(&make_returned_beam), py::arg("position"), py::arg("direction"), py::arg("optical_length"),
-             py::arg("reduced_length"),
-             "position: (2,), where the axis meets the collimator's plane, mm; direction: (3,), unit, z < 0; "
-             "optical_length and reduced_length: sums of n t and of t / n out and back, mm. Raises InvalidArgument "
-             "naming what makes no sense.")
-        .def_property_readonly("position", [](const ReturnedBeam& beam) { return to_numpy_vector(beam.position); })
-        .def_property_readonly("direction", [](const ReturnedBeam& beam) { return to_numpy_vector(beam.direction); })
-        .def_readonly("optical_length", &ReturnedBeam::optical_length)
-        .def_readonly("reduced_length", &ReturnedBeam::reduced_length);
+    bind_options<ReturnedBeam, 4>(
+        m, "ReturnedBeam", "A beam that has come back, in the collimator's frame (beam out along +z, its plane z = 0).",
+        &check_returned,
+        required("position", &ReturnedBeam::position, "(2,), where the axis meets the collimator's plane, mm"),
+        required("direction", &ReturnedBeam::direction, "(3,), unit, z < 0"),
+        required("optical_length", &ReturnedBeam::optical_length, "Sum of n t out and back, mm."),
+        required("reduced_length", &ReturnedBeam::reduced_length, "Sum of t/n out and back, mm."));
 
-    py::class_<Interferometer>(m, "Interferometer",
-                               "What an interferometer makes of the light that comes back to its collimator.")
-        .def(py::init([](double aperture, double acceptance, double least_coupling, double resolution,
-                         double periodic_amplitude, double dead_path, double index_error,
-                         const std::string& reading_model) {
-                 const Interferometer interferometer{
-                     aperture,           acceptance, least_coupling, resolution,
-                     periodic_amplitude, dead_path,  index_error,    parse_reading_model(reading_model)};
-                 check_interferometer(interferometer);
-                 return interferometer;
-             }),
-             py::kw_only(), py::arg("aperture") = no_interferometer.aperture,
-             py::arg("acceptance") = no_interferometer.acceptance,
-             py::arg("least_coupling") = no_interferometer.least_coupling,
-             py::arg("resolution") = no_interferometer.resolution,
-             py::arg("periodic_amplitude") = no_interferometer.periodic_amplitude,
-             py::arg("dead_path") = no_interferometer.dead_path, py::arg("index_error") = no_interferometer.index_error,
-             py::arg("reading_model") = name(no_interferometer.model),
-             "aperture: edge of the square that takes the beam back, mm; acceptance: largest angle of the returned "
-             "beam, "
-             "rad; least_coupling: share of the light; resolution, periodic_amplitude, dead_path: mm; index_error: "
-             "relative; reading_model: \"chief_ray\" or \"coupled_mode\". Raises InvalidArgument naming the value.")
-        .def_readonly("aperture", &Interferometer::aperture)
-        .def_readonly("acceptance", &Interferometer::acceptance)
-        .def_readonly("least_coupling", &Interferometer::least_coupling)
-        .def_readonly("resolution", &Interferometer::resolution)
-        .def_readonly("periodic_amplitude", &Interferometer::periodic_amplitude)
-        .def_readonly("dead_path", &Interferometer::dead_path)
-        .def_readonly("index_error", &Interferometer::index_error)
-        .def_property_readonly("reading_model", [](const Interferometer& i) { return name(i.model); });
+    bind_options<Interferometer>(
+        m, "Interferometer", "What an interferometer makes of the light that comes back to its collimator.",
+        &check_interferometer,
+        field("aperture", &Interferometer::aperture, "Edge of the square that takes the beam back, mm."),
+        field("acceptance", &Interferometer::acceptance, "Largest angle of the returned beam, rad."),
+        field("least_coupling", &Interferometer::least_coupling, "Share of the light."),
+        field("resolution", &Interferometer::resolution, "mm"),
+        field("periodic_amplitude", &Interferometer::periodic_amplitude, "mm"),
+        field("dead_path", &Interferometer::dead_path, "mm"),
+        field("index_error", &Interferometer::index_error, "Relative."),
+        field("reading_model", &Interferometer::model, "\"chief_ray\" or \"coupled_mode\"."));
 
     m.def(
         "couple",
@@ -506,37 +477,31 @@ std::map<std::string, std::optional<double>> read_head(const Head& head, double 
 static void bind_traced_head(py::module_& m) {
     py::register_exception<ReplayMismatch>(m, "ReplayMismatch", PyExc_RuntimeError).attr("__doc__") =
         "A replayed pose differs from its trace, because another face is in the path of the beam; it names the pose.";
-    py::class_<BeamSegment>(m, "BeamSegment", "A straight piece of a beam's way, in the sensor frame, mm.")
-        .def_readonly("beam", &BeamSegment::beam)
-        .def_readonly("parent", &BeamSegment::parent, "Index of the segment it comes from; -1: the source.")
-        .def_property_readonly(
-            "start", [](const BeamSegment& s) { return to_numpy_vector(s.start); }, "(3,) mm")
-        .def_property_readonly(
-            "end", [](const BeamSegment& s) { return to_numpy_vector(s.end); },
-            "Where it meets a face; 50 mm on where it leaves.")
-        .def_readonly("index", &BeamSegment::index, "Refractive index of what it runs in.")
-        .def_readonly("power", &BeamSegment::power, "Share of the source's power.")
+    bind_record(m, "BeamSegment", "A straight piece of a beam's way, in the sensor frame, mm.",
+                field("beam", &BeamSegment::beam),
+                field("parent", &BeamSegment::parent, "Index of the segment it comes from; -1: the source."),
+                field("start", &BeamSegment::start, "(3,) mm"),
+                field("end", &BeamSegment::end, "Where it meets a face; 50 mm on where it leaves."),
+                field("index", &BeamSegment::index, "Refractive index of what it runs in."),
+                field("power", &BeamSegment::power, "Share of the source's power."),
+                field("arrives", &BeamSegment::arrives, "Name of the detector that it arrives at, or None."))
         .def_property_readonly(
             "fate", [](const BeamSegment& s) { return std::string(s.fate); },
-            "\"goes_on\", \"absorbed\", \"left\" or \"cut\".")
-        .def_readonly("arrives", &BeamSegment::arrives, "Name of the detector that it arrives at, or None.");
+            "\"goes_on\", \"absorbed\", \"left\" or \"cut\".");
     m.def("trace_beams", &trace_beams, py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2),
           py::arg("lateral") = zeros(2), py::arg("environment") = std::nullopt,
           "All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, "
           "mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.");
-    py::class_<Sensitivity>(m, "Sensitivity",
-                            "First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, "
-                            "and reading (3,): distance (mm), alpha and beta (rad).")
-        .def_readonly("component", &Sensitivity::component, "Its name; \"mirror\", \"air\", \"all interferometers\".")
-        .def_readonly("quantity", &Sensitivity::quantity,
-                      "\"shift x\", ..., \"rotation x\", ..., \"index\", \"temperature\", \"pressure\", \"humidity\"")
-        .def_readonly("unit", &Sensitivity::unit, "Of the quantity: \"mm\", \"rad\", \"1\", \"K\", \"Pa\"")
-        .def_property_readonly(
-            "signals", [](const Sensitivity& s) { return to_numpy_vector(s.signals); },
-            "(n,) change of the signals by unit of the quantity, mm")
-        .def_property_readonly(
-            "reading", [](const Sensitivity& s) { return to_numpy_vector(s.reading); },
-            "(3,) change of distance (mm), alpha and beta (rad) by unit of the quantity");
+    bind_record(m, "Sensitivity",
+                "First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, "
+                "and reading (3,): distance (mm), alpha and beta (rad).",
+                field("component", &Sensitivity::component, "Its name; \"mirror\", \"air\", \"all interferometers\"."),
+                field("quantity", &Sensitivity::quantity,
+                      "\"shift x\", ..., \"rotation x\", ..., \"index\", \"temperature\", \"pressure\", \"humidity\""),
+                field("unit", &Sensitivity::unit, "Of the quantity: \"mm\", \"rad\", \"1\", \"K\", \"Pa\""),
+                field("signals", &Sensitivity::signals, "(n,) change of the signals by unit of the quantity, mm"),
+                field("reading", &Sensitivity::reading,
+                      "(3,) change of distance (mm), alpha and beta (rad) by unit of the quantity"));
     m.def(
         "head_sensitivities",
         [](const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
@@ -572,24 +537,20 @@ Heads to_heads(const HeadLike& heads, const Plan& plan) {
 }
 
 void bind_head(py::module_& m) {
-    py::class_<HeadCalibration>(m, "HeadCalibration",
-                                "What evaluators know of a head: the constants that its readings are reduced with, mm.")
-        .def_readonly("psd_distance", &HeadCalibration::psd_distance,
-                      "Of the unfolded sensor behind the reference plane, mm, reduced: glass counts as t n_air/n; None "
-                      "without one.")
-        .def_property_readonly(
-            "spot_beam", [](const HeadCalibration& c) { return to_numpy_vector(c.spot_beam); },
-            "(2,) where the beam that makes the spot leaves, (u, v), mm.")
-        .def_property_readonly("beam_offsets",
-                               [](const HeadCalibration& c) {
-                                   Eigen::MatrixXd offsets(c.beam_offsets.size(), 2);
-                                   for (std::size_t i = 0; i < c.beam_offsets.size(); ++i)
-                                       offsets.row(Eigen::Index(i)) = c.beam_offsets[i].transpose();
-                                   return to_numpy(offsets);
-                               })
-        .def_property_readonly(
-            "head_constants", [](const HeadCalibration& c) { return to_numpy(c.head_constants); },
-            "What glass and way before the reference plane add to each distance, mm; readings are corrected for it.");
+    bind_record(
+        m, "HeadCalibration", "What evaluators know of a head: the constants that its readings are reduced with, mm.",
+        field("psd_distance", &HeadCalibration::psd_distance,
+              "Of the unfolded sensor behind the reference plane, mm, reduced: glass counts as t n_air/n; None "
+              "without one."),
+        field("spot_beam", &HeadCalibration::spot_beam, "(2,) where the beam that makes the spot leaves, (u, v), mm."),
+        field("head_constants", &HeadCalibration::head_constants,
+              "What glass and way before the reference plane add to each distance, mm; readings are corrected for it."))
+        .def_property_readonly("beam_offsets", [](const HeadCalibration& c) {
+            Eigen::MatrixXd offsets(c.beam_offsets.size(), 2);
+            for (std::size_t i = 0; i < c.beam_offsets.size(); ++i)
+                offsets.row(Eigen::Index(i)) = c.beam_offsets[i].transpose();
+            return to_numpy(offsets);
+        });
 
     bind_beam(m);
     bind_sensor(m);

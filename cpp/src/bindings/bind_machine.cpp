@@ -1,5 +1,5 @@
-#include "bindings.hpp"
 #include "stepdiag/machine/machine.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -177,22 +177,12 @@ void bind_machine(py::module_& m) {
         "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform "
         "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");
 
-    py::class_<Expansion>(
+    bind_options<Expansion, 1>(
         m, "Expansion",
-        "Thermal expansion of the axes' scales: position p stands at p + coefficient (T - reference)(p - fixed_point).")
-        .def(py::init([](const ArrayLike& coefficient, const ArrayLike& fixed_point, double reference) {
-                 const Expansion expansion{to_vector3(coefficient, "coefficient"),
-                                           to_vector3(fixed_point, "fixed_point"), reference};
-                 check(expansion);
-                 return expansion;
-             }),
-             py::arg("coefficient"), py::kw_only(), py::arg("fixed_point") = zeros(3),
-             py::arg("reference") = Expansion{}.reference,
-             "coefficient (3,) of X, Y, Z, 1/K; fixed_point (3,), mm; reference, degrees Celsius. Raises "
-             "InvalidArgument for a coefficient beyond 1e-3, and for what is not finite.")
-        .def_property_readonly("coefficient", [](const Expansion& e) { return to_numpy_vector(e.coefficient); })
-        .def_property_readonly("fixed_point", [](const Expansion& e) { return to_numpy_vector(e.fixed_point); })
-        .def_readonly("reference", &Expansion::reference)
+        "Thermal expansion of the axes' scales: position p stands at p + coefficient (T - reference)(p - fixed_point).",
+        &check, required("coefficient", &Expansion::coefficient, "(3,) of X, Y, Z, 1/K, 1e-3 at most"),
+        field("fixed_point", &Expansion::fixed_point, "(3,) mm"),
+        field("reference", &Expansion::reference, "degrees Celsius"))
         .def(
             "shift",
             [](const Expansion& e, const ArrayLike& commanded, const ArrayLike& temperature) {

@@ -5,6 +5,7 @@
 #include "bindings.hpp"
 #include "stepdiag/measurement/measurement.hpp"
 #include "stepdiag/measurement/setup_quantity.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -64,26 +65,26 @@ Measurement make_measurement(const std::vector<std::string>& line, const std::ve
 
 void bind_measurement(py::module_& m) {
     using Quantity = SetupQuantityRecord;
-    py::class_<Quantity>(m, "SetupQuantity", "What a line's set-up is made of: a row of setup_quantities().")
-        .def_readonly("name", &Quantity::name, "In options and files.")
-        .def_readonly("key", &Quantity::key, "In scenarios, with its unit.")
-        .def_readonly("symbol", &Quantity::symbol, "Over a column of a report.")
-        .def_readonly("unit", &Quantity::unit, "Of the library: rad, mm, 1, mm s-1.")
-        .def_readonly("report_unit", &Quantity::report_unit, "As in keys.")
-        .def_readonly("components", &Quantity::components, "A letter each; empty: a single one without a letter.")
-        .def_readonly("of_beams", &Quantity::of_beams, "Whether there is one for each of d1 ... dn.")
+    bind_record(m, "SetupQuantity", "What a line's set-up is made of: a row of setup_quantities().",
+                field("name", &Quantity::name, "In options and files."),
+                field("key", &Quantity::key, "In scenarios, with its unit."),
+                field("symbol", &Quantity::symbol, "Over a column of a report."),
+                field("unit", &Quantity::unit, "Of the library: rad, mm, 1, mm s-1."),
+                field("report_unit", &Quantity::report_unit, "As in keys."),
+                field("components", &Quantity::components, "A letter each; empty: a single one without a letter."),
+                field("of_beams", &Quantity::of_beams, "Whether there is one for each of d1 ... dn."),
+                field("prior", &Quantity::prior,
+                      "What an adjustment takes it for by default: infinite: free; 0: fixed at 0; else the standard "
+                      "uncertainty with which it is known to be 0."),
+                field("scale_line_prior", &Quantity::scale_line_prior, "The same on scale lines."),
+                field("usual", &Quantity::usual,
+                      "How far from 0 it usually is, where readings do not tell; infinite: they always do."),
+                field("scale_line_usual", &Quantity::scale_line_usual,
+                      "The same on scale lines whose readings do not tell it."),
+                field("meaning", &Quantity::meaning))
         .def_property_readonly(
             "layout", [](const Quantity& q) { return q.layout ? std::optional(name(*q.layout)) : std::nullopt; },
-            "The only layout of heads that has it.")
-        .def_readonly("prior", &Quantity::prior,
-                      "What an adjustment takes it for by default: infinite: free; 0: fixed at 0; else the standard "
-                      "uncertainty with which it is known to be 0.")
-        .def_readonly("scale_line_prior", &Quantity::scale_line_prior, "The same on scale lines.")
-        .def_readonly("usual", &Quantity::usual,
-                      "How far from 0 it usually is, where readings do not tell; infinite: they always do.")
-        .def_readonly("scale_line_usual", &Quantity::scale_line_usual,
-                      "The same on scale lines whose readings do not tell it.")
-        .def_readonly("meaning", &Quantity::meaning);
+            "The only layout of heads that has it.");
     m.attr("adjusted_quantity_count") = adjusted_quantity_count;
     m.def(
         "setup_quantities", [] { return to_tuple(setup_quantities); },

@@ -10,6 +10,7 @@
 #include "stepdiag/monte_carlo/function_model.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
 #include "stepdiag/monte_carlo/sample_model.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -76,26 +77,18 @@ const char* figure_name(Stability::Figure figure) {
     return names[int(figure)];
 }
 
-void bind_options(py::module_& m) {
-    using Sets = std::vector<std::vector<std::size_t>>;
+void bind_statistics(py::module_& m) {
     m.attr("leaf_samples") = leaf_samples;
     m.attr("pilot_samples") = pilot_samples;
-    py::class_<StatisticsOptions>(m, "StatisticsOptions", "What a Monte Carlo run is to find out of its samples.")
-        .def(py::init([](double coverage, int digits, bool covariance, std::vector<std::size_t> kept, Sets joint) {
-                 return StatisticsOptions{coverage, digits, covariance, std::move(kept), std::move(joint)};
-             }),
-             py::kw_only(), py::arg("coverage") = StatisticsOptions{}.coverage,
-             py::arg("digits") = StatisticsOptions{}.digits, py::arg("covariance") = StatisticsOptions{}.covariance,
-             py::arg("kept") = std::vector<std::size_t>{}, py::arg("joint") = Sets{},
-             "coverage: of intervals; digits: of standard uncertainties that matter, 1 to 3 (bins are a fifth of "
-             "delta wide, JCGM 101, 7.9.2); covariance: of all outputs; kept: outputs of which every value is kept, 8 "
-             "bytes each; joint: sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5). "
-             "make_bins checks them.")
-        .def_readonly("coverage", &StatisticsOptions::coverage)
-        .def_readonly("digits", &StatisticsOptions::digits)
-        .def_readonly("covariance", &StatisticsOptions::covariance)
-        .def_readonly("kept", &StatisticsOptions::kept)
-        .def_readonly("joint", &StatisticsOptions::joint);
+    bind_options<StatisticsOptions>(
+        m, "StatisticsOptions", "What a Monte Carlo run is to find out of its samples. make_bins checks it.", nullptr,
+        field("coverage", &StatisticsOptions::coverage, "Of intervals."),
+        field("digits", &StatisticsOptions::digits,
+              "Of standard uncertainties that matter, 1 to 3; bins are a fifth of delta wide (JCGM 101, 7.9.2)."),
+        field("covariance", &StatisticsOptions::covariance, "Of all outputs."),
+        field("kept", &StatisticsOptions::kept, "Outputs of which every value is kept, 8 bytes each."),
+        field("joint", &StatisticsOptions::joint,
+              "Sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5)."));
     m.def("numerical_tolerance", &numerical_tolerance, py::arg("standard_uncertainty"), py::arg("digits"),
           "delta = 10^r / 2 for u = c 10^r, c a whole number of so many digits (JCGM 101, 7.9.2).");
 
@@ -112,57 +105,46 @@ void bind_options(py::module_& m) {
 }
 
 void bind_result(py::module_& m) {
-    py::class_<JointRegion>(
+    bind_record(
         m, "JointRegion",
         "A region of up to three outputs that holds the coverage (JCGM 102, 6.5): an ellipsoid and a rectangle about "
-        "the pilot run's mean, of its covariance's shape, and the smallest region made of cells of a grid.")
-        .def_readonly("outputs", &JointRegion::outputs)
-        .def_property_readonly("centre", [](const JointRegion& region) { return to_numpy_vector(region.centre); })
-        .def_property_readonly("covariance", [](const JointRegion& region) { return to_numpy(region.covariance); })
-        .def_readonly("ellipsoid_factor", &JointRegion::ellipsoid_factor,
-                      "k_p: (y - centre) covariance^-1 (y - centre) <= k_p^2; nan for a singular covariance")
-        .def_readonly("rectangle_factor", &JointRegion::rectangle_factor, "k_q: |y_j - centre_j| <= k_q u_j")
-        .def_readonly("ellipsoid_volume", &JointRegion::ellipsoid_volume)
-        .def_readonly("rectangle_volume", &JointRegion::rectangle_volume)
-        .def_property_readonly("grid_from", [](const JointRegion& region) { return to_numpy_vector(region.grid_from); })
-        .def_property_readonly("grid_width",
-                               [](const JointRegion& region) { return to_numpy_vector(region.grid_width); })
-        .def_property_readonly("smallest", &to_flags, "1 for each cell of the grid that is in the smallest region")
-        .def_readonly("smallest_volume", &JointRegion::smallest_volume)
-        .def_readonly("smallest_share", &JointRegion::smallest_share, "of all samples");
+        "the pilot run's mean, of its covariance's shape, and the smallest region made of cells of a grid.",
+        field("outputs", &JointRegion::outputs), field("centre", &JointRegion::centre),
+        field("covariance", &JointRegion::covariance),
+        field("ellipsoid_factor", &JointRegion::ellipsoid_factor,
+              "k_p: (y - centre) covariance^-1 (y - centre) <= k_p^2; nan for a singular covariance"),
+        field("rectangle_factor", &JointRegion::rectangle_factor, "k_q: |y_j - centre_j| <= k_q u_j"),
+        field("ellipsoid_volume", &JointRegion::ellipsoid_volume),
+        field("rectangle_volume", &JointRegion::rectangle_volume), field("grid_from", &JointRegion::grid_from),
+        field("grid_width", &JointRegion::grid_width), field("smallest_volume", &JointRegion::smallest_volume),
+        field("smallest_share", &JointRegion::smallest_share, "of all samples"))
+        .def_property_readonly("smallest", &to_flags, "1 for each cell of the grid that is in the smallest region");
 
-    py::class_<Stability>(m, "Stability", "How far an adaptive procedure is from its end.")
-        .def_readonly("blocks", &Stability::blocks)
-        .def_readonly("ratio", &Stability::ratio,
-                      "Twice the standard deviation of the average over blocks by delta, the largest of all.")
-        .def_readonly("output", &Stability::output)
+    bind_record(m, "Stability", "How far an adaptive procedure is from its end.", field("blocks", &Stability::blocks),
+                field("ratio", &Stability::ratio,
+                      "Twice the standard deviation of the average over blocks by delta, the largest of all."),
+                field("output", &Stability::output),
+                field("unstable", &Stability::unstable, "Outputs with a ratio above 1."))
         .def_property_readonly("figure", [](const Stability& s) { return figure_name(s.figure); })
-        .def_readonly("unstable", &Stability::unstable, "Outputs with a ratio above 1.")
         .def_property_readonly("stable", &Stability::stable);
-    py::class_<MonteCarloResult>(m, "MonteCarloResult", "Figures of every output. Native units.")
-        .def_readonly("outputs", &MonteCarloResult::outputs, "With name, position (mm) and unit.")
-        .def_readonly("options", &MonteCarloResult::options, "The StatisticsOptions of the run.")
-        .def_readonly("seed", &MonteCarloResult::seed, "Of the random numbers.")
-        .def_readonly("target", &MonteCarloResult::target, "The instruction set: the same bits for the same one.")
-        .def_readonly("samples", &MonteCarloResult::samples, "Samples that gave a result.")
-        .def_readonly("lost", &MonteCarloResult::lost, "Samples that gave none: left out.")
-        .def_property_readonly(
-            "mean", [](const MonteCarloResult& r) { return to_numpy_vector(r.mean); }, "(outputs,)")
-        .def_property_readonly("standard_uncertainty",
-                               [](const MonteCarloResult& r) { return to_numpy_vector(r.standard_uncertainty); })
-        .def_property_readonly(
-            "symmetric", [](const MonteCarloResult& r) { return to_numpy(r.symmetric); },
-            "(outputs, 2): ends of the probabilistically symmetric coverage intervals")
-        .def_property_readonly(
-            "shortest", [](const MonteCarloResult& r) { return to_numpy(r.shortest); },
-            "(outputs, 2): ends of the shortest coverage intervals")
-        .def_property_readonly(
-            "lowest", [](const MonteCarloResult& r) { return to_numpy_vector(r.lowest); }, "(outputs,) of all samples")
-        .def_property_readonly(
-            "highest", [](const MonteCarloResult& r) { return to_numpy_vector(r.highest); },
-            "(outputs,) of all samples")
-        .def_readonly("outside", &MonteCarloResult::outside,
-                      "Values beyond the bins, by output: an interval's end among them is known roughly.")
+    bind_record(m, "MonteCarloResult", "Figures of every output. Native units.",
+                field("outputs", &MonteCarloResult::outputs, "With name, position (mm) and unit."),
+                field("options", &MonteCarloResult::options, "The StatisticsOptions of the run."),
+                field("seed", &MonteCarloResult::seed, "Of the random numbers."),
+                field("target", &MonteCarloResult::target, "The instruction set: the same bits for the same one."),
+                field("samples", &MonteCarloResult::samples, "Samples that gave a result."),
+                field("lost", &MonteCarloResult::lost, "Samples that gave none: left out."),
+                field("mean", &MonteCarloResult::mean, "(outputs,)"),
+                field("standard_uncertainty", &MonteCarloResult::standard_uncertainty),
+                field("symmetric", &MonteCarloResult::symmetric,
+                      "(outputs, 2): ends of the probabilistically symmetric coverage intervals"),
+                field("shortest", &MonteCarloResult::shortest, "(outputs, 2): ends of the shortest coverage intervals"),
+                field("lowest", &MonteCarloResult::lowest, "(outputs,) of all samples"),
+                field("highest", &MonteCarloResult::highest, "(outputs,) of all samples"),
+                field("outside", &MonteCarloResult::outside,
+                      "Values beyond the bins, by output: an interval's end among them is known roughly."),
+                field("joint", &MonteCarloResult::joint, "A JointRegion for each group that was asked for."),
+                field("stability", &MonteCarloResult::stability, "Of an adaptive run; else None."))
         .def_property_readonly("covariance",
                                [](const MonteCarloResult& r) {
                                    return r.covariance ? std::optional(to_numpy(*r.covariance)) : std::nullopt;
@@ -174,9 +156,7 @@ void bind_result(py::module_& m) {
                 for (const auto& [output, values] : r.kept) kept.emplace(output, to_numpy(values));
                 return kept;
             },
-            "Values by output, in the order of samples; nan for a lost one.")
-        .def_readonly("joint", &MonteCarloResult::joint, "A JointRegion for each group that was asked for.")
-        .def_readonly("stability", &MonteCarloResult::stability, "Of an adaptive run; else None.");
+            "Values by output, in the order of samples; nan for a lost one.");
 }
 
 void bind_parts(py::module_& m) {
@@ -296,10 +276,9 @@ DoubleArray evaluate(const SampleModel& model, std::uint64_t first_sample, std::
 }  // namespace
 
 static void bind_sample_model(py::module_& m) {
-    py::class_<SampleModel::Output>(m, "Output", "An output of a sample model. Native units.")
-        .def_readonly("name", &SampleModel::Output::name)
-        .def_readonly("position", &SampleModel::Output::position, "mm; NaN where it has none.")
-        .def_readonly("unit", &SampleModel::Output::unit, "\"mm\", \"rad\", \"1\"")
+    bind_record(m, "Output", "An output of a sample model. Native units.", field("name", &SampleModel::Output::name),
+                field("position", &SampleModel::Output::position, "mm; NaN where it has none."),
+                field("unit", &SampleModel::Output::unit, "\"mm\", \"rad\", \"1\""))
         .def("__repr__", [](const SampleModel::Output& output) {
             return "Output(" + output.name + ", " + std::to_string(output.position) + ", " + output.unit + ")";
         });
@@ -370,7 +349,7 @@ void bind_monte_carlo(py::module_& m) {
              "function: takes an (inputs, n) array, gives an (outputs, n) array; a sample with a value that is not "
              "finite is lost. correlations: pairs of indices of normal inputs and their correlation matrix. Raises "
              "InvalidArgument.");
-    bind_options(m);
+    bind_statistics(m);
     bind_result(m);
     bind_parts(m);
     bind_runs(m);

@@ -3,6 +3,7 @@
 
 #include "bindings.hpp"
 #include "stepdiag/plan/run_order.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -38,17 +39,22 @@ DoubleArray positions_of(const std::vector<PlanPoint>& points) {
     return to_numpy(positions);
 }
 
+void check_counts(const CheckPoints& points) {
+    for (const auto& [name, steps] : {std::pair("every", points.every), std::pair("at", points.at)})
+        if (steps < 0 || steps > Plan::largest_step_count)
+            throw InvalidArgument(std::string(name) + ": expected a whole number from 0 to " +
+                                  std::to_string(Plan::largest_step_count) + ", got " + std::to_string(steps));
+}
+
 }  // namespace
 
 void bind_plan(py::module_& m) {
-    py::class_<PlannedPass>(m, "PlannedPass", "One pass along a line of a plan, as Plan.passes gives it.")
-        .def_property_readonly(
-            "line_index", [](const PlannedPass& pass) { return pass.line_index; },
-            "The line's place among the plan's lines, then its scale lines, from 0.")
+    bind_record(m, "PlannedPass", "One pass along a line of a plan, as Plan.passes gives it.",
+                field("line_index", &PlannedPass::line_index,
+                      "The line's place among the plan's lines, then its scale lines, from 0."),
+                field("run", &PlannedPass::run),
+                field("direction", &PlannedPass::direction, "\"forward\" or \"backward\"."))
         .def_property_readonly("line", [](const PlannedPass& pass) { return pass.line.name(); })
-        .def_readonly("run", &PlannedPass::run)
-        .def_property_readonly(
-            "direction", [](const PlannedPass& pass) { return name(pass.direction); }, "\"forward\" or \"backward\".")
         .def_property_readonly(
             "points",
             [](const PlannedPass& pass) {
@@ -70,18 +76,12 @@ void bind_plan(py::module_& m) {
             },
             "How the axes X, Y, Z come to every point, the first included: +1 or -1, (3,).");
 
-    py::class_<CheckPoints>(m, "CheckPoints",
-                            "Returns to one point of each line but scale lines, which tell a drift from the machine's "
-                            "errors.")
-        .def(py::init([](const IntegerLike& every, const IntegerLike& at) {
-                 return CheckPoints{int(to_integer(every, "every", 0, Plan::largest_step_count)),
-                                    int(to_integer(at, "at", 0, Plan::largest_step_count))};
-             }),
-             py::arg("every") = integer(0), py::arg("at") = integer(0),
-             "every: after so many steps, each a move of every axis; 0: there are none. at: the point is that after so "
-             "many steps, 0 the line's first.")
-        .def_readonly("every", &CheckPoints::every)
-        .def_readonly("at", &CheckPoints::at);
+    bind_options<CheckPoints, 2>(
+        m, "CheckPoints",
+        "Returns to one point of each line but scale lines, which distinguish a drift from the machine's errors.",
+        &check_counts,
+        field("every", &CheckPoints::every, "After so many steps, each a move of every axis; 0: there are none."),
+        field("at", &CheckPoints::at, "The point is that after so many steps, 0 the line's first."));
 
     py::class_<Plan>(m, "Plan",
                      "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "

@@ -3,6 +3,7 @@
 #include "options.hpp"
 #include "stepdiag/recheck/recheck.hpp"
 #include "stepdiag/recheck/verification.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -55,62 +56,55 @@ DoubleArray seen(const Recheck& recheck, double alpha, double power) {
 }
 
 void bind_rechecking(py::module_& m) {
-    py::class_<ChangePriors>(m, "ChangePriors",
-                             "Standard uncertainties with which changes of a machine are known to be 0: scale (mm/mm), "
-                             "bow (mm), slope of an angle from end to end (rad), squareness (rad); 0: none of it.")
-        .def(py::init([](double scale, double bow, double slope, double squareness) {
-                 return ChangePriors{scale, bow, slope, squareness};
-             }),
-             py::kw_only(), py::arg("scale") = ChangePriors{}.scale, py::arg("bow") = ChangePriors{}.bow,
-             py::arg("slope") = ChangePriors{}.slope, py::arg("squareness") = ChangePriors{}.squareness)
-        .def_readonly("scale", &ChangePriors::scale)
-        .def_readonly("bow", &ChangePriors::bow)
-        .def_readonly("slope", &ChangePriors::slope)
-        .def_readonly("squareness", &ChangePriors::squareness);
-    py::class_<ChangeTerm>(m, "ChangeTerm", "How a parameter of the machine has changed.")
-        .def_readonly("parameter", &ChangeTerm::parameter)
-        .def_property_readonly(
-            "kind", [](const ChangeTerm& t) { return name(t.kind); },
-            "\"scale\" (mm/mm), \"bow\" (mm, in the middle), \"slope\" (rad, from end to end) or \"squareness\" (rad).")
-        .def_readonly("value", &ChangeTerm::value)
-        .def_readonly("standard_uncertainty", &ChangeTerm::standard_uncertainty, "With the prior.")
-        .def_readonly("prior", &ChangeTerm::prior, "Standard uncertainty with which it was known to be 0.")
-        .def_readonly("determined", &ChangeTerm::determined,
-                      "How much of it the readings determine, 0 to 1: near 1 by itself; in between only in sums.");
-    py::class_<ChangeCombination>(m, "ChangeCombination", "A sum of changes, by their priors, that readings determine.")
-        .def_readonly("weight", &ChangeCombination::weight, "By term; the square sum is 1.")
-        .def_readonly("value", &ChangeCombination::value, "In units of the priors.")
-        .def_readonly("standard_uncertainty", &ChangeCombination::standard_uncertainty,
-                      "Of the readings and the calibration alone.");
-    py::class_<PredictedReading>(m, "PredictedReading", "A reading against what was to be read.")
-        .def_readonly("row", &PredictedReading::row, "Of the measurement, from 0.")
-        .def_readonly("channel", &PredictedReading::channel, "\"distance\", ...")
-        .def_readonly("deviation", &PredictedReading::deviation, "Read minus predicted, mm or rad.")
-        .def_readonly("standard_uncertainty", &PredictedReading::standard_uncertainty, "Of the deviation.");
-    py::class_<Recheck>(m, "Recheck", "Whether a machine has changed since its calibration, and by what.")
-        .def_readonly("chi_square", &Recheck::chi_square, "Of no change at all.")
-        .def_readonly("degrees_of_freedom", &Recheck::degrees_of_freedom,
-                      "Directions of change that the readings tell better than the priors.")
-        .def_readonly("probability", &Recheck::probability, "Of a larger chi-square, if nothing has changed.")
-        .def_readonly("fit_chi_square", &Recheck::fit_chi_square, "Of all readings, with the change.")
-        .def_readonly("fit_degrees_of_freedom", &Recheck::fit_degrees_of_freedom, "Of all readings, with the change.")
-        .def_readonly("fit_probability", &Recheck::fit_probability,
-                      "Of a larger one, if such a change, of any size, explains the readings.")
+    bind_options<ChangePriors>(
+        m, "ChangePriors",
+        "Standard uncertainties with which changes of a machine are known to be 0; 0: there is none of it.", nullptr,
+        field("scale", &ChangePriors::scale, "Of a positioning deviation, mm/mm."),
+        field("bow", &ChangePriors::bow, "Of a straightness, in the middle of the travel, mm."),
+        field("slope", &ChangePriors::slope, "Of an angle, from end to end of the travel, rad."),
+        field("squareness", &ChangePriors::squareness, "rad"));
+    bind_record(m, "ChangeTerm", "How a parameter of the machine has changed.",
+                field("parameter", &ChangeTerm::parameter),
+                field("kind", &ChangeTerm::kind,
+                      "\"scale\" (mm/mm), \"bow\" (mm, in the middle), \"slope\" (rad, from end to end) or "
+                      "\"squareness\" (rad)."),
+                field("value", &ChangeTerm::value),
+                field("standard_uncertainty", &ChangeTerm::standard_uncertainty, "With the prior."),
+                field("prior", &ChangeTerm::prior, "Standard uncertainty with which it was known to be 0."),
+                field("determined", &ChangeTerm::determined,
+                      "How much of it the readings determine, 0 to 1: near 1 by itself; in between only in sums."));
+    bind_record(m, "ChangeCombination", "A sum of changes, by their priors, that readings determine.",
+                field("weight", &ChangeCombination::weight, "By term; the square sum is 1."),
+                field("value", &ChangeCombination::value, "In units of the priors."),
+                field("standard_uncertainty", &ChangeCombination::standard_uncertainty,
+                      "Of the readings and the calibration alone."));
+    bind_record(m, "PredictedReading", "A reading against what was to be read.",
+                field("row", &PredictedReading::row, "Of the measurement, from 0."),
+                field("channel", &PredictedReading::channel, "\"distance\", ..."),
+                field("deviation", &PredictedReading::deviation, "Read minus predicted, mm or rad."),
+                field("standard_uncertainty", &PredictedReading::standard_uncertainty, "Of the deviation."));
+    bind_record(m, "Recheck", "Whether a machine has changed since its calibration, and by what.",
+                field("chi_square", &Recheck::chi_square, "Of no change at all."),
+                field("degrees_of_freedom", &Recheck::degrees_of_freedom,
+                      "Directions of change that the readings tell better than the priors."),
+                field("probability", &Recheck::probability, "Of a larger chi-square, if nothing has changed."),
+                field("fit_chi_square", &Recheck::fit_chi_square, "Of all readings, with the change."),
+                field("fit_degrees_of_freedom", &Recheck::fit_degrees_of_freedom, "Of all readings, with the change."),
+                field("fit_probability", &Recheck::fit_probability,
+                      "Of a larger one, if such a change, of any size, explains the readings."),
+                field("covariance", &Recheck::covariance, "(n, n) of the terms."),
+                field("shape", &Recheck::shape,
+                      "(entries of the calibration's covariance, n): what a change of 1 of each term adds to them."),
+                field("updated", &Recheck::updated, "The calibration with the change, and their joint covariance."))
         .def_property_readonly(
             "terms", [](const Recheck& r) { return to_tuple(r.terms); },
             "A ChangeTerm for each way in which the machine may change.")
         .def_property_readonly(
             "combinations", [](const Recheck& r) { return to_tuple(r.combinations); }, "The best determined first.")
-        .def_property_readonly(
-            "covariance", [](const Recheck& r) { return to_numpy(r.covariance); }, "(n, n) of the terms.")
-        .def_property_readonly(
-            "shape", [](const Recheck& r) { return to_numpy(r.shape); },
-            "(entries of the calibration's covariance, n): what a change of 1 of each term adds to them.")
         .def("smallest_changes_seen", &seen, py::kw_only(), py::arg("alpha") = 0.001, py::arg("power") = 0.95,
              "(n,) smallest change of each term, alone, that such readings show with the probability `power` if an "
              "unchanged machine is said to have changed with the probability `alpha`; inf where they tell nothing of "
              "it. Raises InvalidArgument unless 0 < alpha < power < 1.")
-        .def_readonly("updated", &Recheck::updated, "The calibration with the change, and their joint covariance.")
         .def_property_readonly(
             "left_out", [](const Recheck& r) { return to_tuple(r.left_out); },
             "A FaultClass for each fault that an adjustment of the run by itself finds, where the readings do not go "
@@ -132,14 +126,14 @@ void bind_rechecking(py::module_& m) {
 
 void bind_recheck(py::module_& m) {
     bind_rechecking(m);
-    py::class_<LineDeviation>(m, "LineDeviation", "What a line of one run reads too much from end to end.")
-        .def_readonly("run", &LineDeviation::run, "Of the line, from 0.")
-        .def_readonly("line", &LineDeviation::line, "Such as \"ppp\".")
+    bind_record(m, "LineDeviation", "What a line of one run reads too much from end to end.",
+                field("run", &LineDeviation::run, "Of the line, from 0."),
+                field("line", &LineDeviation::line, "Such as \"ppp\"."),
+                field("deviation", &LineDeviation::deviation, "Read minus predicted, mm; of beams their mean."),
+                field("standard_uncertainty", &LineDeviation::standard_uncertainty, "Of the deviation, mm."))
         .def_property_readonly(
             "direction", [](const LineDeviation& d) { return d.backward ? "backward" : "forward"; },
             "\"forward\" or \"backward\".")
-        .def_readonly("deviation", &LineDeviation::deviation, "Read minus predicted, mm; of beams their mean.")
-        .def_readonly("standard_uncertainty", &LineDeviation::standard_uncertainty, "Of the deviation, mm.")
         .def_property_readonly("normalised", &LineDeviation::normalised,
                                "E_n: the deviation by its expanded uncertainty (k = 2).");
 

@@ -1,124 +1,69 @@
 #include "options.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "stepdiag/simulation/virtual_readout.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
 
-Eigen::Vector2d to_finite_pair(const ArrayLike& array, const char* key) {
-    const Eigen::Vector2d pair = to_vector2(array, key);
-    if (!pair.allFinite()) throw InvalidArgument("misalignment " + std::string(key) + ": expected two finite numbers");
-    return pair;
+void check_finite(const Misalignment& misalignment) {
+    for (const auto& [key, pair] :
+         {std::pair("reflector", misalignment.reflector), std::pair("laser", misalignment.laser),
+          std::pair("psd_zero", misalignment.psd_zero), std::pair("lateral", misalignment.lateral)})
+        if (!pair.allFinite())
+            throw InvalidArgument("misalignment " + std::string(key) + ": expected two finite numbers");
 }
 
 }  // namespace
 
 void bind_simulation(py::module_& m) {
-    py::class_<Misalignment>(
-        m, "Misalignment",
-        "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, "
-        "a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), "
-        "roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times "
-        "their offsets), drift of the distances (mm/s).")
-        .def(py::init([](const ArrayLike& reflector, const ArrayLike& laser, const ArrayLike& psd_zero,
-                         double distance_constant, const std::vector<double>& beam_constants, const ArrayLike& lateral,
-                         double roll, double gain, double drift) {
-                 return Misalignment{to_finite_pair(reflector, "reflector"),
-                                     to_finite_pair(laser, "laser"),
-                                     to_finite_pair(psd_zero, "psd_zero"),
-                                     distance_constant,
-                                     beam_constants,
-                                     to_finite_pair(lateral, "lateral"),
-                                     roll,
-                                     gain,
-                                     drift};
-             }),
-             py::arg("reflector") = zeros(2), py::arg("laser") = zeros(2), py::arg("psd_zero") = zeros(2),
-             py::arg("distance_constant") = 0.0, py::arg("beam_constants") = std::vector<double>{}, py::kw_only(),
-             py::arg("lateral") = zeros(2), py::arg("roll") = 0.0, py::arg("gain") = 0.0, py::arg("drift") = 0.0,
-             "Raises InvalidArgument for what is no pair of finite numbers.")
-        .def_readonly("distance_constant", &Misalignment::distance_constant, "What all distances read too much, mm.")
-        .def_readonly("beam_constants", &Misalignment::beam_constants, "What d1, d2, ... read too much, mm.")
-        .def_readonly("roll", &Misalignment::roll)
-        .def_readonly("gain", &Misalignment::gain)
-        .def_readonly("drift", &Misalignment::drift)
-        .def_property_readonly("lateral", [](const Misalignment& m) { return to_numpy_vector(m.lateral); })
-        .def_property_readonly("reflector", [](const Misalignment& m) { return to_numpy_vector(m.reflector); })
-        .def_property_readonly("laser", [](const Misalignment& m) { return to_numpy_vector(m.laser); })
-        .def_property_readonly("psd_zero", [](const Misalignment& m) { return to_numpy_vector(m.psd_zero); });
+    bind_options<Misalignment, 5>(
+        m, "Misalignment", "How head and mirror are out of true on a line.", &check_finite,
+        field("reflector", &Misalignment::reflector, "(2,) angles of the mirror a, b, rad"),
+        field("laser", &Misalignment::laser, "(2,) angles of the laser a, b, rad"),
+        field("psd_zero", &Misalignment::psd_zero, "(2,) zero offset of the position sensing device, mm"),
+        field("distance_constant", &Misalignment::distance_constant, "What all distances read too much, mm."),
+        field("beam_constants", &Misalignment::beam_constants, "What d1, d2, ... read too much, mm."),
+        field("lateral", &Misalignment::lateral, "(2,) offset of the beam's origin, mm"),
+        field("roll", &Misalignment::roll, "Of the head, rad."),
+        field("gain", &Misalignment::gain,
+              "Tilts and spots read 1 + gain times themselves; beams stand at 1 + gain times their offsets."),
+        field("drift", &Misalignment::drift, "Of the distances, mm/s."));
 
-    py::class_<Noise>(m, "Noise",
-                      "Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt "
-                      "(rad), spot (mm); common (mm): one draw a row, added to all of its distances.")
-        .def(py::init([](double distance, double tilt, double spot, const IntegerLike& seed, double common) {
-                 const Noise noise{distance, tilt, spot, to_seed(seed), common};
-                 check_noise(noise);
-                 return noise;
-             }),
-             py::arg("distance") = 0.0, py::arg("tilt") = 0.0, py::arg("spot") = 0.0, py::arg("seed") = integer(0),
-             py::arg("common") = 0.0,
-             "Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 "
-             "- 1.")
-        .def_readonly("distance", &Noise::distance)
-        .def_readonly("tilt", &Noise::tilt)
-        .def_readonly("spot", &Noise::spot)
-        .def_readonly("common", &Noise::common)
-        .def_readonly("seed", &Noise::seed);
+    bind_options<Noise, 5>(m, "Noise", "Standard deviations of an independent Gaussian per reading.", &check_noise,
+                           field("distance", &Noise::distance, "mm; also of d1, ..."),
+                           field("tilt", &Noise::tilt, "rad"), field("spot", &Noise::spot, "mm"),
+                           field("seed", &Noise::seed, "0 to 2^64 - 1"),
+                           field("common", &Noise::common, "mm: one draw a row, added to all of its distances"));
 
-    py::class_<ScaleTemperatures>(
+    bind_options<ScaleTemperatures, 3>(
         m, "ScaleTemperatures",
         "How warm the scales of the axes are, and how they expand. Makes the channels temperature_x, temperature_y and "
-        "temperature_z, or temperature alone of one sensor.")
-        .def(py::init([](const Expansion& expansion, const ArrayLike& start, const ArrayLike& rate, bool one_sensor) {
-                 return ScaleTemperatures{expansion, to_vector3(start, "start"), to_vector3(rate, "rate"), one_sensor};
-             }),
-             py::arg("expansion"), py::arg("start"), py::arg("rate") = zeros(3), py::kw_only(),
-             py::arg("one_sensor") = false,
-             "start (3,): of X, Y, Z at the run's first reading, degrees Celsius; rate (3,), K/s. simulate() checks "
-             "them.")
-        .def_readonly("expansion", &ScaleTemperatures::expansion, "Of the scales.")
-        .def_property_readonly("start", [](const ScaleTemperatures& s) { return to_numpy_vector(s.start); })
-        .def_property_readonly("rate", [](const ScaleTemperatures& s) { return to_numpy_vector(s.rate); })
-        .def_readonly("one_sensor", &ScaleTemperatures::one_sensor, "Whether one sensor measures for all axes.");
+        "temperature_z, or temperature alone of one sensor. simulate() checks it.",
+        nullptr, required("expansion", &ScaleTemperatures::expansion, "Of the scales."),
+        required("start", &ScaleTemperatures::start, "(3,) of X, Y, Z at the run's first reading, degrees Celsius"),
+        field("rate", &ScaleTemperatures::rate, "(3,) K/s"),
+        field("one_sensor", &ScaleTemperatures::one_sensor, "Whether one sensor measures for all axes."));
 
     m.attr("largest_repeat_count") = SimulationOptions::largest_repeat_count;
-    py::class_<SimulationOptions>(
-        m, "SimulationOptions",
-        "What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is "
-        "aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of "
-        "1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: "
-        "of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs "
-        "0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; "
-        "seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded; "
-        "machine_drift (3,): of the functional point along the axes since the first reading, mm/s.")
-        .def(py::init([](const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
-                         const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
-                         double verified_share, const IntegerLike& repeats, bool backward,
-                         const std::optional<double>& seconds_per_reading,
-                         const std::optional<ScaleTemperatures>& scales, const ArrayLike& machine_drift) {
-                 return SimulationOptions{misalignment,   noise,
-                                          environment,    assumed,
-                                          verified_share, to_int(repeats, "repeats"),
-                                          backward,       seconds_per_reading,
-                                          scales,         to_vector3(machine_drift, "machine_drift")};
-             }),
-             py::kw_only(), py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
-             py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
-             py::arg("verified_share") = SimulationOptions{}.verified_share, py::arg("repeats") = integer(1),
-             py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
-             py::arg("scales") = std::nullopt, py::arg("machine_drift") = zeros(3),
-             "Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.")
-        .def_readonly("misalignment", &SimulationOptions::misalignment)
-        .def_readonly("noise", &SimulationOptions::noise, "Of the readings.")
-        .def_readonly("environment", &SimulationOptions::environment)
-        .def_readonly("assumed_environment", &SimulationOptions::assumed)
-        .def_readonly("verified_share", &SimulationOptions::verified_share)
-        .def_readonly("repeats", &SimulationOptions::repeats)
-        .def_readonly("backward", &SimulationOptions::backward)
-        .def_readonly("seconds_per_reading", &SimulationOptions::seconds_per_reading)
-        .def_readonly("scales", &SimulationOptions::scales)
-        .def_property_readonly("machine_drift",
-                               [](const SimulationOptions& o) { return to_numpy_vector(o.machine_drift); });
+    bind_options<SimulationOptions>(
+        m, "SimulationOptions", "What simulate() takes beside machine, plan and head, and checks.", nullptr,
+        field("misalignment", &SimulationOptions::misalignment, "By line name; a line without an entry is aligned."),
+        field("noise", &SimulationOptions::noise, "Of the readings."),
+        field("environment", &SimulationOptions::environment,
+              "The air of the trace; None: of 20 degrees Celsius for a head with a design, an index of 1 for others."),
+        field("assumed_environment", &SimulationOptions::assumed,
+              "What the readings are reduced with; None: the same."),
+        field("verified_share", &SimulationOptions::verified_share,
+              "Of a traced head's replayed poses, traced again and compared."),
+        field("repeats", &SimulationOptions::repeats, "How often each line is measured: runs 0, 1, 2, ..."),
+        field("backward", &SimulationOptions::backward,
+              "Runs 0, 2, ... are each followed by one in reverse order, 1, 3, ..."),
+        field("seconds_per_reading", &SimulationOptions::seconds_per_reading,
+              "Makes the channel time; None: no times."),
+        field("scales", &SimulationOptions::scales, "They expand, and their temperatures are recorded."),
+        field("machine_drift", &SimulationOptions::machine_drift,
+              "(3,) of the functional point along the axes since the first reading, mm/s"));
 
     m.def(
         "simulate",

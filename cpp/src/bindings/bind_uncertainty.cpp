@@ -9,16 +9,26 @@
 #include "stepdiag/uncertainty/validation.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 #include "stepdiag/uncertainty/volumetric_accuracy.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
+
+template <>
+InputQuantity parsed<InputQuantity>(const std::string& word) {
+    return parse_input_quantity(word);
+}
+template <>
+NoiseQuantity parsed<NoiseQuantity>(const std::string& word) {
+    return parse_noise_quantity(word);
+}
 
 // --- uncertain inputs ---
 
 static void bind_uncertain_inputs(py::module_& m) {
     using Quantity = UncertainQuantity;
-    py::class_<Quantity>(m, "UncertainQuantity", "What may be uncertain about a virtual calibration.")
-        .def_readonly("name", &Quantity::name)
-        .def_readonly("key", &Quantity::key, "In scenarios, with its unit; empty: it has others.")
+    bind_record(m, "UncertainQuantity", "What may be uncertain about a virtual calibration.",
+                field("name", &Quantity::name),
+                field("key", &Quantity::key, "In scenarios, with its unit; empty: it has others."))
         .def_property_readonly(
             "of",
             [](const Quantity& q) {
@@ -34,45 +44,31 @@ static void bind_uncertain_inputs(py::module_& m) {
         "uncertain_quantities", [] { return to_tuple(uncertain_quantities()); },
         "The set-up quantities, what lines share, and the noises.");
 
-    py::class_<UncertainInput>(
+    bind_options<UncertainInput, 2>(
         m, "UncertainInput",
-        "An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. "
-        "quantity: one of setup_quantities(), of a line (component 0, 1: a, b or x, y); \"part_shift\" (mm), "
-        "\"part_rotation\" (rad): of a part of the head; \"psd_distance\", \"beam_offset\" (mm), \"reading_model\" "
-        "(1): of the head; \"temperature\" (degrees Celsius), \"pressure\" (Pa), \"humidity\" (1), "
-        "\"refractive_index\", \"wavelength\" (1, relative): of the air; \"machine_drift\" (mm/s, x, y, z).")
-        .def(py::init([](const std::string& quantity, const Distribution& distribution, const std::string& line,
-                         const std::string& part, const IntegerLike& component) {
-                 return UncertainInput{parse_input_quantity(quantity), distribution, line, part,
-                                       to_int(component, "component")};
-             }),
-             py::arg("quantity"), py::arg("distribution"), py::kw_only(), py::arg("line") = "", py::arg("part") = "",
-             py::arg("component") = integer(0), "Raises InvalidArgument for a quantity that is not known.")
-        .def_property_readonly("quantity", [](const UncertainInput& input) { return name(input.quantity); })
-        .def_readonly("distribution", &UncertainInput::distribution,
-                      "Of the deviation from the nominal value, mm, rad or the quantity's unit.")
-        .def_readonly("line", &UncertainInput::line)
-        .def_readonly("part", &UncertainInput::part)
-        .def_readonly("component", &UncertainInput::component)
+        "An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal.",
+        nullptr,
+        required("quantity", &UncertainInput::quantity,
+                 "One of setup_quantities(), of a line (component 0, 1: a, b or x, y); \"part_shift\" (mm), "
+                 "\"part_rotation\" (rad): of a part of the head; \"psd_distance\", \"beam_offset\" (mm), "
+                 "\"reading_model\" (1): of the head; \"temperature\" (degrees Celsius), \"pressure\" (Pa), "
+                 "\"humidity\" (1), \"refractive_index\", \"wavelength\" (1, relative): of the air; "
+                 "\"machine_drift\" (mm/s, x, y, z)."),
+        required("distribution", &UncertainInput::distribution,
+                 "Of the deviation from the nominal value, mm, rad or the quantity's unit."),
+        field("line", &UncertainInput::line), field("part", &UncertainInput::part),
+        field("component", &UncertainInput::component))
         .def_property_readonly(
             "name", [](const UncertainInput& input) { return name(input); }, "With its line, component and part.");
 
-    py::class_<ReadingNoise>(
-        m, "ReadingNoise",
-        "What is drawn for every reading or pose. quantity: \"channel\" (of the channel named), \"common\" (mm, one "
-        "draw a reading for all its distances), \"head_walk\", \"machine_walk\" (mm/sqrt(s), random walks), "
-        "\"position\" (mm), \"orientation\" (rad): repeatability of the machine, component x, y, z.")
-        .def(py::init([](const std::string& quantity, const Distribution& distribution, const std::string& channel,
-                         const IntegerLike& component) {
-                 return ReadingNoise{parse_noise_quantity(quantity), distribution, channel,
-                                     to_int(component, "component")};
-             }),
-             py::arg("quantity"), py::arg("distribution"), py::kw_only(), py::arg("channel") = "",
-             py::arg("component") = integer(0), "Raises InvalidArgument for a quantity that is not known.")
-        .def_property_readonly("quantity", [](const ReadingNoise& noise) { return name(noise.quantity); })
-        .def_readonly("distribution", &ReadingNoise::distribution, "Of each draw, mm or rad.")
-        .def_readonly("channel", &ReadingNoise::channel)
-        .def_readonly("component", &ReadingNoise::component)
+    bind_options<ReadingNoise, 2>(
+        m, "ReadingNoise", "What is drawn for every reading or pose.", nullptr,
+        required("quantity", &ReadingNoise::quantity,
+                 "\"channel\" (of the channel named), \"common\" (mm, one draw a reading for all its distances), "
+                 "\"head_walk\", \"machine_walk\" (mm/sqrt(s), random walks), \"position\" (mm), \"orientation\" "
+                 "(rad): repeatability of the machine, component x, y, z."),
+        required("distribution", &ReadingNoise::distribution, "Of each draw, mm or rad."),
+        field("channel", &ReadingNoise::channel), field("component", &ReadingNoise::component))
         .def_property_readonly(
             "name", [](const ReadingNoise& noise) { return name(noise); }, "With its line and component.");
 
@@ -120,23 +116,18 @@ std::map<std::string, std::vector<std::string>> missing_by_name(
 }
 
 void bind_points(py::module_& m) {
-    py::class_<ErrorAtPoint>(
+    bind_record(
         m, "ErrorAtPoint",
         "The deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool at a commanded point, to "
         "first order, with covariance from the calibration's. NaN where the calibration lacks something that acts "
-        "there.")
-        .def_property_readonly(
-            "point", [](const ErrorAtPoint& e) { return to_numpy_vector(e.point); }, "(3,) mm")
-        .def_property_readonly(
-            "tool", [](const ErrorAtPoint& e) { return to_numpy_vector(e.tool); }, "(3,) mm")
-        .def_property_readonly(
-            "value", [](const ErrorAtPoint& e) { return to_numpy_vector(e.value); }, "(6,) mm, rad")
+        "there.",
+        field("point", &ErrorAtPoint::point, "(3,) mm"), field("tool", &ErrorAtPoint::tool, "(3,) mm"),
+        field("value", &ErrorAtPoint::value, "(6,) mm, rad"),
+        field("covariance", &ErrorAtPoint::covariance,
+              "(6, 6) mm^2, mm rad, rad^2; NaN where the calibration has none."))
         .def_property_readonly(
             "standard_uncertainty", [](const ErrorAtPoint& e) { return to_numpy_vector(e.standard_uncertainty()); },
             "(6,) mm, rad; NaN where the calibration has no covariance.")
-        .def_property_readonly(
-            "covariance", [](const ErrorAtPoint& e) { return to_numpy(Eigen::MatrixXd(e.covariance)); },
-            "(6, 6) mm^2, mm rad, rad^2; NaN where the calibration has none.")
         .def_property_readonly(
             "missing", [](const ErrorAtPoint& e) { return missing_by_name(e.missing, deviation_names); },
             "\"X\" ... \"C\" -> parameters that act in it and are not determined: \"EAX\", \"slope of EXX\".");
@@ -151,28 +142,22 @@ void bind_points(py::module_& m) {
         "direction: e = sum over axes of delta + theta x lever. Raises InvalidArgument for lengths that are not "
         "finite.");
 
-    py::class_<DiagonalErrors>(
+    bind_record(
         m, "DiagonalErrors",
         "Along a body diagonal (ISO 230-6): how much further than commanded the functional point is from where the "
-        "diagonal begins.")
+        "diagonal begins.",
+        field("point", &DiagonalErrors::point, "(n, 3) mm, commanded"),
+        field("travel", &DiagonalErrors::travel, "(n,) mm, commanded, from the first point"),
+        field("value", &DiagonalErrors::value, "(n,) mm; NaN where the calibration lacks something."),
+        field("covariance", &DiagonalErrors::covariance, "(n, n) mm^2"),
+        field("missing", &DiagonalErrors::missing, "Parameters that are not determined."))
         .def_property_readonly(
             "line", [](const DiagonalErrors& d) { return d.line.name(); }, "The body diagonal: \"ppp\", ...")
         .def_property_readonly(
-            "point", [](const DiagonalErrors& d) { return to_numpy(Eigen::MatrixXd(d.point)); }, "(n, 3) mm, commanded")
-        .def_property_readonly(
-            "travel", [](const DiagonalErrors& d) { return to_numpy_vector(d.travel); },
-            "(n,) mm, commanded, from the first point")
-        .def_property_readonly(
-            "value", [](const DiagonalErrors& d) { return to_numpy_vector(d.value); },
-            "(n,) mm; NaN where the calibration lacks something.")
-        .def_property_readonly(
             "standard_uncertainty", [](const DiagonalErrors& d) { return to_numpy_vector(d.standard_uncertainty()); },
             "(n,) mm; NaN where the calibration has no covariance.")
-        .def_property_readonly(
-            "covariance", [](const DiagonalErrors& d) { return to_numpy(d.covariance); }, "(n, n) mm^2")
         .def_property_readonly("range", &DiagonalErrors::range,
-                               "Largest less smallest value, mm; its uncertainty: volumetric_accuracy.")
-        .def_readonly("missing", &DiagonalErrors::missing, "Parameters that are not determined.");
+                               "Largest less smallest value, mm; its uncertainty: volumetric_accuracy.");
 
     m.def(
         "diagonal_errors",
@@ -191,12 +176,22 @@ void bind_volume(py::module_& m) {
     const auto column = [](auto member) {
         return [member](const VolumetricAccuracy& v) { return to_numpy_vector(Eigen::VectorXd(v.*member)); };
     };
-    py::class_<VolumetricAccuracy>(
+    bind_record(
         m, "VolumetricAccuracy",
         "ISO 230-1's V_XYZ: the ranges over the volume of the deviations X, Y, Z (mm) of the functional point and A, "
         "B, C (rad) of the tool, and the ranges of the four body diagonals' errors (mm); in the order of `names`. A "
         "range is not linear in the parameters and noise makes it larger: `bias` says about how much larger `value` is "
-        "than the true range; `interval` takes that off.")
+        "than the true range; `interval` takes that off.",
+        field("drawn_interval", &VolumetricAccuracy::drawn_interval,
+              "(10, 2) probabilistically symmetric coverage interval of the draws: too large by twice the bias."),
+        field("interval", &VolumetricAccuracy::interval,
+              "(10, 2) the drawn interval mirrored about the value, 2 value - drawn_interval: takes the bias off to "
+              "first "
+              "order; not below 0."),
+        field("resolution", &VolumetricAccuracy::resolution,
+              "By how much V_X, V_Y, V_Z may be too small on either side for want of points between the nodes "
+              "of axes that carry the workpiece, mm; 0 with one such axis."),
+        field("samples", &VolumetricAccuracy::samples, "Draws of the covariance."))
         .def_property_readonly("names", [](const VolumetricAccuracy&) { return range_names; })
         .def_property_readonly("value", column(&VolumetricAccuracy::value), "(10,) of the calibration's values.")
         .def_property_readonly("mean", column(&VolumetricAccuracy::mean), "(10,) of the draws.")
@@ -204,24 +199,12 @@ void bind_volume(py::module_& m) {
                                "(10,) standard deviation of the draws.")
         .def_property_readonly(
             "bias", [](const VolumetricAccuracy& v) { return to_numpy_vector(v.bias()); }, "(10,) mean - value")
-        .def_property_readonly(
-            "drawn_interval", [](const VolumetricAccuracy& v) { return to_numpy(Eigen::MatrixXd(v.drawn_interval)); },
-            "(10, 2) probabilistically symmetric coverage interval of the draws: too large by twice the bias.")
-        .def_property_readonly(
-            "interval", [](const VolumetricAccuracy& v) { return to_numpy(Eigen::MatrixXd(v.interval)); },
-            "(10, 2) the drawn interval mirrored about the value, 2 value - drawn_interval: takes the bias off to "
-            "first "
-            "order; not below 0.")
         .def_property_readonly("bound", column(&VolumetricAccuracy::bound),
                                "(10,) the true range is within value -+ bound with at least the coverage probability: "
                                "the quantile of the range of noise alone.")
-        .def_readonly("resolution", &VolumetricAccuracy::resolution,
-                      "By how much V_X, V_Y, V_Z may be too small on either side for want of points between the nodes "
-                      "of axes that carry the workpiece, mm; 0 with one such axis.")
         .def_property_readonly(
             "missing", [](const VolumetricAccuracy& v) { return missing_by_name(v.missing, range_names); },
-            "Name -> parameters that act in it and are not determined; its numbers are NaN.")
-        .def_readonly("samples", &VolumetricAccuracy::samples, "Draws of the covariance.");
+            "Name -> parameters that act in it and are not determined; its numbers are NaN.");
 
     m.def(
         "volumetric_accuracy",
@@ -458,20 +441,29 @@ Propagation propagate_linear(const ArrayLike& value, const ArrayLike& sensitivit
 }  // namespace
 
 static void bind_propagation(py::module_& m) {
-    py::class_<Propagation>(
+    bind_record(
         m, "Propagation",
         "Uncertainty of outputs by the law of propagation (GUM, JCGM 100), native units; arrays in the order of "
-        "`outputs`.")
-        .def_readonly("outputs", &Propagation::outputs)
-        .def_property_readonly(
-            "value", [](const Propagation& p) { return to_numpy_vector(p.value); }, "(m,)")
-        .def_property_readonly(
-            "standard_uncertainty", [](const Propagation& p) { return to_numpy_vector(p.standard_uncertainty); },
-            "(m,)")
-        .def_property_readonly(
-            "degrees_of_freedom", [](const Propagation& p) { return to_numpy_vector(p.degrees_of_freedom); },
-            "(m,) effective ones by Welch and Satterthwaite (GUM G.4.1); NaN where that does not apply: correlated "
-            "inputs with finite degrees of freedom contribute.")
+        "`outputs`.",
+        field("outputs", &Propagation::outputs), field("value", &Propagation::value, "(m,)"),
+        field("standard_uncertainty", &Propagation::standard_uncertainty, "(m,)"),
+        field("degrees_of_freedom", &Propagation::degrees_of_freedom,
+              "(m,) effective ones by Welch and Satterthwaite (GUM G.4.1); NaN where that does not apply: correlated "
+              "inputs with finite degrees of freedom contribute."),
+        field("between_groups", &Propagation::between_groups,
+              "(m,) part of the variance by correlation between inputs of two groups."),
+        field("first_order", &Propagation::first_order, "(m, inputs) sensitivity x standard uncertainty."),
+        field(
+            "second_order", &Propagation::second_order,
+            "(m, inputs) what the square of a deviation by the standard uncertainty does, (f(+u) + f(-u) - 2 f(0))/2; "
+            "linear propagation leaves it out. 0 where not known."),
+        field("knows_products", &Propagation::knows_products,
+              "Whether strongest_product, product_variance and product_shift are known: of virtual calibrations "
+              "with up to 120 inputs."),
+        field("product_variance", &Propagation::product_variance,
+              "(m,) variance by products of two independent inputs; empty where not known."),
+        field("product_shift", &Propagation::product_shift,
+              "(m,) by how much products of correlated inputs shift the mean; empty where not known."))
         .def_property_readonly(
             "covariance",
             [](const Propagation& p) {
@@ -489,9 +481,6 @@ static void bind_propagation(py::module_& m) {
             "group of inputs -> (m,) standard uncertainty of each output by that group alone; with between_groups, "
             "the squares sum to the square of standard_uncertainty.")
         .def_property_readonly(
-            "between_groups", [](const Propagation& p) { return to_numpy_vector(p.between_groups); },
-            "(m,) part of the variance by correlation between inputs of two groups.")
-        .def_property_readonly(
             "inputs",
             [](const Propagation& p) {
                 std::vector<std::string> names;
@@ -499,22 +488,11 @@ static void bind_propagation(py::module_& m) {
                 return names;
             },
             "Names of the inputs that are drawn once: columns of first_order and second_order.")
-        .def_property_readonly(
-            "first_order", [](const Propagation& p) { return to_numpy(p.first_order); },
-            "(m, inputs) sensitivity x standard uncertainty.")
-        .def_property_readonly(
-            "second_order", [](const Propagation& p) { return to_numpy(p.second_order); },
-            "(m, inputs) what the square of a deviation by the standard uncertainty does, (f(+u) + f(-u) - 2 f(0))/2; "
-            "linear propagation leaves it out. 0 where not known.")
         .def(
             "expanded", [](const Propagation& p, double coverage) { return to_numpy_vector(p.expanded(coverage)); },
             py::arg("coverage") = 0.95,
             "(m,) U = t_p u, of degrees of freedom truncated to whole ones (GUM G.4.1, G.6.4). Raises InvalidArgument "
             "for a probability outside 0 .. 1.")
-        .def_readonly(
-            "knows_products", &Propagation::knows_products,
-            "Whether strongest_product, product_variance and product_shift are known: of virtual calibrations "
-            "with up to 120 inputs.")
         .def_property_readonly(
             "strongest_product",
             [](const Propagation& p) {
@@ -528,12 +506,6 @@ static void bind_propagation(py::module_& m) {
             },
             "Of each output the two inputs whose product does most when both deviate by their standard uncertainty, "
             "and what it does; empty where not known.")
-        .def_property_readonly(
-            "product_variance", [](const Propagation& p) { return to_numpy_vector(p.product_variance); },
-            "(m,) variance by products of two independent inputs; empty where not known.")
-        .def_property_readonly(
-            "product_shift", [](const Propagation& p) { return to_numpy_vector(p.product_shift); },
-            "(m,) by how much products of correlated inputs shift the mean; empty where not known.")
         .def_property_readonly(
             "second_order_shift", [](const Propagation& p) { return to_numpy_vector(p.second_order_shift()); },
             "(m,) by how much squares of deviations, and products of correlated ones, shift the mean.")
@@ -576,13 +548,16 @@ static void bind_validation(py::module_& m) {
     const auto vector = [](auto member) {
         return [member](const Validation& v) { return to_numpy_vector(v.*member); };
     };
-    py::class_<Validation>(
+    bind_record(
         m, "Validation",
         "Propagation beside the Monte Carlo method (JCGM 101, 8), arrays in the order of `outputs`, native units: "
-        "validated where neither end of y -+ U is further than delta from that of the symmetric coverage interval.")
-        .def_readonly("outputs", &Validation::outputs, "With name, position (mm) and unit.")
-        .def_readonly("coverage", &Validation::coverage, "Of the intervals.")
-        .def_readonly("digits", &Validation::digits, "Significant digits of u that the tolerance comes from.")
+        "validated where neither end of y -+ U is further than delta from that of the symmetric coverage interval.",
+        field("outputs", &Validation::outputs, "With name, position (mm) and unit."),
+        field("coverage", &Validation::coverage, "Of the intervals."),
+        field("digits", &Validation::digits, "Significant digits of u that the tolerance comes from."),
+        field("validated", &Validation::validated),
+        field("reason", &Validation::reason,
+              "Where it is not validated, why: which square or distribution, with figures; empty elsewhere."))
         .def_property_readonly("delta", vector(&Validation::delta),
                                "(m,) half a unit of the last significant digit of u.")
         .def_property_readonly("low", vector(&Validation::low), "(m,) y - U")
@@ -592,9 +567,6 @@ static void bind_validation(py::module_& m) {
         .def_property_readonly("sampling", vector(&Validation::sampling),
                                "(m,) standard uncertainty of the Monte Carlo interval's ends by the number of samples; "
                                "should be small beside delta.")
-        .def_readonly("validated", &Validation::validated)
-        .def_readonly("reason", &Validation::reason,
-                      "Where it is not validated, why: which square or distribution, with figures; empty elsewhere.")
         .def_property_readonly("failures", &Validation::failures, "How many outputs are not validated.");
 
     m.def(

@@ -1,6 +1,7 @@
 #include "bindings.hpp"
 #include "stepdiag/uncertainty/volume_draws.hpp"
 #include "stepdiag/uncertainty/volume_errors.hpp"
+#include "struct_table.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -31,26 +32,18 @@ DoubleArray to_rows(SixRows&& rows) {
 }  // namespace
 
 void bind_volume_errors(py::module_& m) {
-    py::class_<VolumeSummary>(
+    bind_record(
         m, "VolumeSummary",
         "Errors e of the functional point (mm) and tilts of the tool (rad) on a grid, by the exact "
-        "pose, of axes that came in + direction.")
-        .def_readonly("largest", &VolumeSummary::largest, "Largest |e|, mm.")
-        .def_property_readonly(
-            "largest_at", [](const VolumeSummary& v) { return to_numpy_vector(v.largest_at); }, "(3,) where, mm")
-        .def_property_readonly(
-            "components", [](const VolumeSummary& v) { return to_numpy_vector(v.components); }, "(3,) e there, mm")
-        .def_readonly("rms", &VolumeSummary::rms,
-                      "Root of the mean of |e|^2 over the box, by the trapezoidal rule, mm.")
-        .def_property_readonly(
-            "lowest", [](const VolumeSummary& v) { return to_numpy_vector(v.lowest); }, "(3,) of e by component, mm")
-        .def_property_readonly(
-            "highest", [](const VolumeSummary& v) { return to_numpy_vector(v.highest); }, "(3,) of e by component, mm")
-        .def_property_readonly(
-            "tilt_lowest", [](const VolumeSummary& v) { return to_numpy_vector(v.tilt_lowest); }, "(3,) A, B, C, rad")
-        .def_property_readonly(
-            "tilt_highest", [](const VolumeSummary& v) { return to_numpy_vector(v.tilt_highest); },
-            "(3,) A, B, C, rad");
+        "pose, of axes that came in + direction.",
+        field("largest", &VolumeSummary::largest, "Largest |e|, mm."),
+        field("largest_at", &VolumeSummary::largest_at, "(3,) where, mm"),
+        field("components", &VolumeSummary::components, "(3,) e there, mm"),
+        field("rms", &VolumeSummary::rms, "Root of the mean of |e|^2 over the box, by the trapezoidal rule, mm."),
+        field("lowest", &VolumeSummary::lowest, "(3,) of e by component, mm"),
+        field("highest", &VolumeSummary::highest, "(3,) of e by component, mm"),
+        field("tilt_lowest", &VolumeSummary::tilt_lowest, "(3,) A, B, C, rad"),
+        field("tilt_highest", &VolumeSummary::tilt_highest, "(3,) A, B, C, rad"));
     m.def(
         "summarise_volume",
         [](const Machine& machine, const ArrayLike& x, const ArrayLike& y, const ArrayLike& z,
