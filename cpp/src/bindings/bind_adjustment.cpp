@@ -41,14 +41,13 @@ struct Outlier {
 };
 
 // In Python, an adjustment knows the rows of its run.
-struct AdjustmentOfRun {
-    Adjustment adjustment;
+struct AdjustmentOfRun : Adjustment {
     std::vector<Station> stations;
 
     template <typename Value>
     py::dict by_channel(double missing, const Value& value) const {
         py::dict channels;
-        for (const ReadingResidual& residual : adjustment.residuals) {
+        for (const ReadingResidual& residual : residuals) {
             const py::str name(residual.channel);
             if (!channels.contains(name)) {
                 py::array_t<double> empty(py::ssize_t(stations.size()));
@@ -64,46 +63,50 @@ struct AdjustmentOfRun {
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
 
 void bind_thresholds(py::module_& m) {
-    py::class_<Thresholds> bound(m, "Thresholds",
-                                 "Every limit that a verdict, or the search for faults and mistakes, is made with. "
-                                 "thresholds has the values in force.");
-    const auto add = [&](const char* name, double Thresholds::* value, const char* doc) {
-        bound.def_readonly(name, value, doc);
-    };
-    add("largest_noise_factor", &Thresholds::largest_noise_factor, "Beyond it a fit is rejected.");
-    add("misfit_rejected", &Thresholds::misfit_rejected,
-        "Probability of a misfit below which a fit is rejected, where the misfit also differs between lines, channels "
-        "or times.");
-    add("misfit_doubtful", &Thresholds::misfit_doubtful, "Probability of a misfit below which a fit is doubtful.");
-    add("noise_component", &Thresholds::noise_component,
-        "Probability below which the scatter of a channel is taken for its noise.");
-    add("widest_component", &Thresholds::widest_component,
-        "Largest relative standard uncertainty of a noise factor that is used.");
-    add("no_misfit_doubtful", &Thresholds::no_misfit_doubtful, "The same above which there is less noise than stated.");
-    add("pattern", &Thresholds::pattern, "Probability of a pattern of residuals, where chi-square finds a misfit.");
-    add("pattern_alone", &Thresholds::pattern_alone, "The same, where it finds none.");
-    add("rounding_alone", &Thresholds::rounding_alone, "Rms of residuals in units of their rounding.");
-    add("far_below_stated", &Thresholds::far_below_stated, "Noise factor below which such residuals are no noise.");
-    add("farthest_prior", &Thresholds::farthest_prior,
-        "Distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2), beyond which a fit is rejected.");
-    add("prior_scatter_rejected", &Thresholds::prior_scatter_rejected,
-        "Probability of set-up values that scatter more than their priors, below which a fit is rejected.");
-    add("fault", &Thresholds::fault, "Least gain of a fault in chi-square.");
-    add("most_faults", &Thresholds::most_faults, "Of a channel, by its redundancy; one in any case.");
-    add("fault_cost", &Thresholds::fault_cost,
-        "How many times as large uncertainties what was done about faults may make the largest of a family.");
-    add("alternative", &Thresholds::alternative, "What is less behind the best fault or mistake may be it.");
-    add("second_order", &Thresholds::second_order, "Gain from which second order may distinguish faults.");
-    add("gross_scatter", &Thresholds::gross_scatter, "Of the square sum a reading: values far from any machine.");
-    add("mistake", &Thresholds::mistake, "Least gain of a mistake in the whole run.");
-    add("chance", &Thresholds::chance, "Difference in chi-square that does not make one mistake better than another.");
-    add("faults_of_mistake", &Thresholds::faults_of_mistake,
-        "Number of faults from which one mistake that explains as much is the likelier.");
-    add("lines_of_mistake", &Thresholds::lines_of_mistake, "The same of lines that have faults.");
-    add("found_with_99_percent", &Thresholds::found_with_99_percent,
-        "Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.");
-    bound.def_property_readonly("largest_variance_factor", &Thresholds::largest_variance_factor,
-                                "Square of largest_noise_factor.");
+    bind_record(
+        m, "Thresholds",
+        "Every limit that a verdict, or the search for faults and mistakes, is made with. "
+        "thresholds has the values in force.",
+        field("largest_noise_factor", &Thresholds::largest_noise_factor, "Beyond it a fit is rejected."),
+        field("misfit_rejected", &Thresholds::misfit_rejected,
+              "Probability of a misfit below which a fit is rejected, where the misfit also differs between lines, "
+              "channels "
+              "or times."),
+        field("misfit_doubtful", &Thresholds::misfit_doubtful,
+              "Probability of a misfit below which a fit is doubtful."),
+        field("noise_component", &Thresholds::noise_component,
+              "Probability below which the scatter of a channel is taken for its noise."),
+        field("widest_component", &Thresholds::widest_component,
+              "Largest relative standard uncertainty of a noise factor that is used."),
+        field("no_misfit_doubtful", &Thresholds::no_misfit_doubtful,
+              "The same above which there is less noise than stated."),
+        field("pattern", &Thresholds::pattern,
+              "Probability of a pattern of residuals, where chi-square finds a misfit."),
+        field("pattern_alone", &Thresholds::pattern_alone, "The same, where it finds none."),
+        field("rounding_alone", &Thresholds::rounding_alone, "Rms of residuals in units of their rounding."),
+        field("far_below_stated", &Thresholds::far_below_stated,
+              "Noise factor below which such residuals are no noise."),
+        field("farthest_prior", &Thresholds::farthest_prior,
+              "Distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2), beyond which a fit is rejected."),
+        field("prior_scatter_rejected", &Thresholds::prior_scatter_rejected,
+              "Probability of set-up values that scatter more than their priors, below which a fit is rejected."),
+        field("fault", &Thresholds::fault, "Least gain of a fault in chi-square."),
+        field("most_faults", &Thresholds::most_faults, "Of a channel, by its redundancy; one in any case."),
+        field("fault_cost", &Thresholds::fault_cost,
+              "How many times as large uncertainties what was done about faults may make the largest of a family."),
+        field("alternative", &Thresholds::alternative, "What is less behind the best fault or mistake may be it."),
+        field("second_order", &Thresholds::second_order, "Gain from which second order may distinguish faults."),
+        field("gross_scatter", &Thresholds::gross_scatter, "Of the square sum a reading: values far from any machine."),
+        field("mistake", &Thresholds::mistake, "Least gain of a mistake in the whole run."),
+        field("chance", &Thresholds::chance,
+              "Difference in chi-square that does not make one mistake better than another."),
+        field("faults_of_mistake", &Thresholds::faults_of_mistake,
+              "Number of faults from which one mistake that explains as much is the likelier."),
+        field("lines_of_mistake", &Thresholds::lines_of_mistake, "The same of lines that have faults."),
+        field("found_with_99_percent", &Thresholds::found_with_99_percent,
+              "Size of a fault, in its standard uncertainties, that is found with a probability of 99 %."))
+        .def_property_readonly("largest_variance_factor", &Thresholds::largest_variance_factor,
+                               "Square of largest_noise_factor.");
     m.attr("thresholds") = thresholds;
 }
 
@@ -228,7 +231,7 @@ void bind_adjustment_options(py::module_& m) {
               "stated."));
 }
 
-void bind_result(py::module_& m) {
+void bind_estimates(py::module_& m) {
     bind_record(
         m, "SetupEstimate", "One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.",
         field("run", &SetupEstimate::run, "The first run that has this set-up."),
@@ -280,7 +283,9 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "factor", [](const VarianceComponent& c) { return c.noise.factor; },
             "Root of the component: times the noise that is stated.");
+}
 
+void bind_faults(py::module_& m) {
     bind_record(
         m, "Outlier", "A reading that was left out.", field("row", &Outlier::row, "Row of the measurement, from 0."),
         field("run", &Outlier::run, "Of the line, from 0."), field("line", &Outlier::line, "Such as \"ppp\"."),
@@ -315,7 +320,9 @@ void bind_result(py::module_& m) {
         field("plausible", &FaultClass::plausible, "The plausible limit of that parameter."))
         .def_property_readonly("distinguished", &FaultClass::is_distinguished,
                                "Whether the readings determine which one it was.");
+}
 
+void bind_verdict(py::module_& m) {
     bind_record(
         m, "FitReason", "Why a fit is not accepted, or what its residuals have in common.",
         field(
@@ -374,7 +381,9 @@ void bind_result(py::module_& m) {
                 return terms;
             },
             "(weight, parameter) each; of a set-up its quantities, as in SetupEstimate.");
+}
 
+void bind_fault_control(py::module_& m) {
     const auto by_family = [](double FaultControl::Effect::* effect) {
         return [effect](const FaultControl& c) {
             return std::map<std::string, double>{{"positioning", c.positioning.*effect},
@@ -425,43 +434,59 @@ void bind_result(py::module_& m) {
             },
             "Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of one that nothing "
             "controls.");
+}
 
+std::vector<Outlier> outliers_of(const AdjustmentOfRun& found) {
+    std::vector<Outlier> list;
+    for (const ReadingResidual& x : found.residuals) {
+        if (x.used()) continue;
+        const Station& s = found.stations[x.row];
+        list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual, x.normalised, x.outlier});
+    }
+    std::stable_sort(list.begin(), list.end(), [](const Outlier& a, const Outlier& b) { return a.number < b.number; });
+    return list;
+}
+
+void bind_adjustment_of_run(py::module_& m) {
     using Result = AdjustmentOfRun;
-    py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
-        .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
+    const auto by_reading = [](double ReadingResidual::* value) {
+        return [value](const Result& r) -> ChannelArrays {
+            return r.by_channel(NAN, [value](const ReadingResidual& x) { return x.*value; });
+        };
+    };
+    add_properties(
+        py::class_<Result>(m, "Adjustment",
+                           "What an adjustment found: calibration, set-ups, and how the readings fit."),
+        field("calibration", &Adjustment::calibration, "With fit and variance factor."),
+        field("setup", &Adjustment::setup, "A SetupEstimate for each set-up unknown."),
+        field("expansion", &Adjustment::expansion, "Expansion coefficients that were unknowns."),
+        field("variance_components", &Adjustment::variance_components,
+              "VarianceComponent of each channel, and of its lines that scatter otherwise; of what others control."),
+        field("rounded", &Adjustment::rounded,
+              "Channels of which the stated uncertainties are below what their numbers, or double precision, can bear; "
+              "that took their place."),
+        field("machine_drift", &Adjustment::machine_drift, "Rates of the machine's drift that were unknowns."),
+        field("faults", &Adjustment::faults, "Classes of faults that were found, and what was done about them."),
+        field("reliability", &Adjustment::reliability, "If it was asked for."),
+        field("unseen", &Adjustment::unseen, "By kind of fault, what may be in it unseen."),
+        field("verdict", &Adjustment::verdict, "Whether the readings agree with each other and with the priors."),
+        field("weighted_square_sum", &Adjustment::weighted_square_sum, "Of residuals and priors."),
+        field("degrees_of_freedom", &Adjustment::degrees_of_freedom, "Readings and priors more than unknowns."),
+        field("chi_square_probability", &Adjustment::chi_square_probability,
+              "Of a larger square sum, if model and uncertainties are right."),
+        field("iterations", &Adjustment::iterations, "Gauss-Newton steps from zero."),
+        field("combinations", &Adjustment::combinations,
+              "What is known of unknowns that are not determined one by one."))
+        .def_property_readonly("variance_factor", &Adjustment::variance_factor,
+                               "weighted_square_sum/degrees_of_freedom; 1 without freedom.")
         .def_property_readonly(
-            "setup", [](const Result& r) { return r.adjustment.setup; }, "A SetupEstimate for each set-up unknown.")
-        .def_property_readonly(
-            "expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
-            "Expansion coefficients that were unknowns.")
-        .def_property_readonly(
-            "variance_components", [](const AdjustmentOfRun& a) { return a.adjustment.variance_components; },
-            "VarianceComponent of each channel, and of its lines that scatter otherwise; of what others control.")
-        .def_property_readonly(
-            "rounded", [](const AdjustmentOfRun& a) { return a.adjustment.rounded; },
-            "Channels of which the stated uncertainties are below what their numbers, or double precision, can bear; "
-            "that took their place.")
-        .def_property_readonly(
-            "machine_drift", [](const AdjustmentOfRun& a) { return a.adjustment.machine_drift; },
-            "Rates of the machine's drift that were unknowns.")
-        .def_property_readonly(
-            "residuals",
-            [](const Result& r) -> ChannelArrays {
-                return r.by_channel(NAN, [](const ReadingResidual& x) { return x.residual; });
-            },
+            "residuals", by_reading(&ReadingResidual::residual),
             "channel -> (n,) read minus adjusted, mm or rad, by row of the measurement; NaN where nothing was read.")
         .def_property_readonly(
-            "redundancy",
-            [](const Result& r) -> ChannelArrays {
-                return r.by_channel(NAN, [](const ReadingResidual& x) { return x.redundancy; });
-            },
+            "redundancy", by_reading(&ReadingResidual::redundancy),
             "channel -> (n,): 0 where nothing controls a reading, 1 where all others know it better.")
-        .def_property_readonly(
-            "normalised_residuals",
-            [](const Result& r) -> ChannelArrays {
-                return r.by_channel(NAN, [](const ReadingResidual& x) { return x.normalised; });
-            },
-            "channel -> (n,): residuals by their own standard uncertainty.")
+        .def_property_readonly("normalised_residuals", by_reading(&ReadingResidual::normalised),
+                               "channel -> (n,): residuals by their own standard uncertainty.")
         .def_property_readonly(
             "used",
             [](const Result& r) {
@@ -470,65 +495,23 @@ void bind_result(py::module_& m) {
                 return py::typing::Dict<py::str, py::array_t<bool>>(used);
             },
             "channel -> (n,) whether a reading was used: it was there, and is no outlier.")
-        .def_property_readonly("outliers",
-                               [](const Result& r) {
-                                   std::vector<Outlier> list;
-                                   for (const ReadingResidual& x : r.adjustment.residuals) {
-                                       if (x.used()) continue;
-                                       const Station& s = r.stations[x.row];
-                                       list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
-                                                       x.normalised, x.outlier});
-                                   }
-                                   std::stable_sort(list.begin(), list.end(), [](const Outlier& a, const Outlier& b) {
-                                       return a.number < b.number;
-                                   });
-                                   return list;
-                               })
-        .def_property_readonly(
-            "faults", [](const Result& r) { return r.adjustment.faults; },
-            "Classes of faults that were found, and what was done about them.")
-        .def_property_readonly(
-            "reliability", [](const Result& r) { return r.adjustment.reliability; }, "If it was asked for.")
-        .def_property_readonly(
-            "unseen", [](const Result& r) { return r.adjustment.unseen; },
-            "By kind of fault, what may be in it unseen.")
-        .def_property_readonly(
-            "verdict", [](const Result& r) { return r.adjustment.verdict; },
-            "Whether the readings agree with each other and with the priors.")
-        .def_property_readonly(
-            "weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; },
-            "Of residuals and priors.")
-        .def_property_readonly(
-            "variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); },
-            "weighted_square_sum/degrees_of_freedom; 1 without freedom.")
-        .def_property_readonly(
-            "degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; },
-            "Readings and priors more than unknowns.")
-        .def_property_readonly(
-            "chi_square_probability", [](const Result& r) { return r.adjustment.chi_square_probability; },
-            "Of a larger square sum, if model and uncertainties are right.")
-        .def_property_readonly(
-            "iterations", [](const Result& r) { return r.adjustment.iterations; }, "Gauss-Newton steps from zero.")
-        .def_property_readonly(
-            "combinations", [](const Result& r) { return r.adjustment.combinations; },
-            "What is known of unknowns that are not determined one by one.")
-        .def(
-            "with_calibration",
-            [](Result found, const Calibration& calibration) {
-                found.adjustment.calibration = calibration;
-                return found;
-            },
-            py::arg("calibration"), "The same, with this calibration: its own, with more words.")
+        .def_property_readonly("outliers", &outliers_of, "Readings that were left out.")
         .def_property_readonly(
             "smoothness",
             [](const Result& r) {
                 std::map<std::string, double> deviations;
                 for (int i = 0; i < function_count; ++i)
-                    if (r.adjustment.smoothness[i] > 0.0)
-                        deviations[FunctionId::at(i).name()] = r.adjustment.smoothness[i];
+                    if (r.smoothness[i] > 0.0) deviations[FunctionId::at(i).name()] = r.smoothness[i];
                 return deviations;
             },
-            "function -> standard deviation of its second differences (mm or rad) in force.");
+            "function -> standard deviation of its second differences (mm or rad) in force.")
+        .def(
+            "with_calibration",
+            [](Result found, const Calibration& calibration) {
+                found.calibration = calibration;
+                return found;
+            },
+            py::arg("calibration"), "The same, with this calibration: its own, with more words.");
 }
 
 AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, const HeadLike& head,
@@ -560,7 +543,11 @@ std::optional<FitQuality> fit_quality_of_run(const Measurement& measurement, con
 void bind_adjustment(py::module_& m) {
     bind_thresholds(m);
     bind_adjustment_options(m);
-    bind_result(m);
+    bind_estimates(m);
+    bind_faults(m);
+    bind_verdict(m);
+    bind_fault_control(m);
+    bind_adjustment_of_run(m);
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "
@@ -569,7 +556,7 @@ void bind_adjustment(py::module_& m) {
     m.def(
         "judge",
         [](AdjustmentOfRun found, const std::string& mistake, const std::vector<std::string>& implausible_inputs) {
-            found.adjustment = judge(std::move(found.adjustment), {mistake, implausible_inputs});
+            static_cast<Adjustment&>(found) = judge(found, {mistake, implausible_inputs});
             return found;
         },
         py::arg("adjustment"), py::kw_only(), py::arg("mistake") = "",

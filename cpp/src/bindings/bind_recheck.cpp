@@ -9,14 +9,13 @@ namespace stepdiag::bindings {
 namespace {
 
 // In Python, a verification knows the rows of its run.
-struct VerificationOfRun {
-    Verification verification;
+struct VerificationOfRun : Verification {
     std::size_t rows;
 
     template <typename Value>
     py::typing::Dict<py::str, DoubleArray> by_channel(const Value& value) const {
         py::typing::Dict<py::str, DoubleArray> channels;
-        for (const PredictedReading& reading : verification.readings) {
+        for (const PredictedReading& reading : readings) {
             const py::str name(reading.channel);
             if (!channels.contains(name)) {
                 py::array_t<double> empty((py::ssize_t(rows)));
@@ -138,40 +137,37 @@ void bind_recheck(py::module_& m) {
                                "E_n: the deviation by its expanded uncertainty (k = 2).");
 
     using Result = VerificationOfRun;
-    py::class_<Result>(m, "Verification", "How readings agree with a calibration that was made without them.")
+    const auto by_reading = [](double PredictedReading::* value) {
+        return
+            [value](const Result& r) { return r.by_channel([value](const PredictedReading& x) { return x.*value; }); };
+    };
+    add_properties(
+        py::class_<Result>(m, "Verification", "How readings agree with a calibration that was made without them."),
+        field("chi_square", &Verification::chi_square, "Of all deviations."),
+        field("degrees_of_freedom", &Verification::degrees_of_freedom, "Of chi_square."),
+        field("probability", &Verification::probability,
+              "Of a larger chi-square, if calibration, readings and uncertainties are right."))
         .def_property_readonly(
-            "lines", [](const Result& r) { return to_tuple(r.verification.lines); },
+            "lines", [](const Result& r) { return to_tuple(r.lines); },
             "A LineDeviation for each pass of a line that has two distances.")
         .def_property_readonly(
-            "deviations",
-            [](const Result& r) { return r.by_channel([](const PredictedReading& x) { return x.deviation; }); },
+            "deviations", by_reading(&PredictedReading::deviation),
             "channel -> (n,) read minus predicted, mm or rad, by row of the measurement; NaN where nothing was read.")
-        .def_property_readonly(
-            "standard_uncertainties",
-            [](const Result& r) {
-                return r.by_channel([](const PredictedReading& x) { return x.standard_uncertainty; });
-            },
-            "channel -> (n,): of the deviations.")
+        .def_property_readonly("standard_uncertainties", by_reading(&PredictedReading::standard_uncertainty),
+                               "channel -> (n,): of the deviations.")
         .def_property_readonly(
             "normalised",
             [](const Result& r) { return r.by_channel([](const PredictedReading& x) { return x.normalised(); }); },
-            "channel -> (n,) E_n: deviations by their expanded uncertainties (k = 2); 0 for a reading that only tells "
+            "channel -> (n,) E_n: deviations by their expanded uncertainties (k = 2); 0 for a reading that only shows "
             "how head and mirror stood.")
         .def_property_readonly(
-            "chi_square", [](const Result& r) { return r.verification.chi_square; }, "Of all deviations.")
-        .def_property_readonly(
-            "degrees_of_freedom", [](const Result& r) { return r.verification.degrees_of_freedom; }, "Of chi_square.")
-        .def_property_readonly(
-            "probability", [](const Result& r) { return r.verification.probability; },
-            "Of a larger chi-square, if calibration, readings and uncertainties are right.")
-        .def_property_readonly(
-            "left_out", [](const Result& r) { return to_tuple(r.verification.left_out); },
+            "left_out", [](const Result& r) { return to_tuple(r.left_out); },
             "A FaultClass for each fault that an adjustment of the run by itself finds, where the readings do not "
             "agree. The readings that they may have spoilt are left out of everything.")
         .def_property_readonly(
             "worst",
             [](const Result& r) {
-                const PredictedReading& worst = r.verification.readings[r.verification.worst];
+                const PredictedReading& worst = r.readings[r.worst];
                 return std::pair(worst.row, worst.channel);
             },
             "Row and channel of the reading with the largest |E_n|.");

@@ -110,21 +110,25 @@ Field<T, Value, true> required(const char* name, Value T::* member, const char* 
     return {name, member, doc};
 }
 
-template <class T, class Value, bool is_required>
-void add_property(py::class_<T>& bound, const Field<T, Value, is_required>& field) {
+template <class Class, class T, class Value, bool is_required>
+void add_property(Class& bound, const Field<T, Value, is_required>& field) {
     if constexpr (InPython<Value>::is_plain) bound.def_readonly(field.name, field.member, field.doc);
     else
         bound.def_property_readonly(
             field.name, [member = field.member](const T& value) { return InPython<Value>::of(value.*member); },
             field.doc);
 }
+// Of a class that has more than its fields; T may be derived from theirs.
+template <class T, class... Fields>
+py::class_<T> add_properties(py::class_<T> bound, const Fields&... fields) {
+    (add_property(bound, fields), ...);
+    return bound;
+}
 
 // A struct that functions return: its fields are read-only properties.
 template <class T, class... Values>
 py::class_<T> bind_record(py::module_& m, const char* name, const char* doc, const Field<T, Values>&... fields) {
-    py::class_<T> bound(m, name, doc);
-    (add_property(bound, fields), ...);
-    return bound;
+    return add_properties(py::class_<T>(m, name, doc), fields...);
 }
 
 template <class T, class Value, bool is_required>
@@ -162,8 +166,7 @@ py::class_<T> bind_options(py::module_& m, const char* name, const char* doc, vo
     py::class_<T> bound(m, name, doc);
     add_constructor(bound, check, std::tuple(fields...), std::make_index_sequence<by_position>(),
                     std::make_index_sequence<sizeof...(Fields) - by_position>());
-    (add_property(bound, fields), ...);
-    return bound;
+    return add_properties(bound, fields...);
 }
 
 }  // namespace stepdiag::bindings

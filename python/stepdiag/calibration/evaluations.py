@@ -1,7 +1,7 @@
 """The core's evaluations with their findings in words: the core gives findings as data, files hold sentences."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -40,13 +40,13 @@ def evaluate(
     chain: _core.Chain | str,
     tool: ArrayLike = (0.0, 0.0, 0.0),
     *,
-    method: Literal["conventional", "enhanced", "adjustment"] = "adjustment",
+    method: str = "adjustment",
     uncertainty: _core.ReadingUncertainty | None = None,
     full_covariance: bool = False,
     plausible: _core.PlausibleLimits | None = None,
     expansion: _core.KnownExpansion | None = None,
 ) -> Calibration:
-    """Calibration from a run. Arguments as of `adjust`.
+    """Calibration from a run by the method "conventional", "enhanced" or "adjustment". Arguments as of `adjust`.
 
     uncertainty: of readings where the run states none. plausible: what a machine can be. expansion: of the scales;
     with it positioning errors are referred to its temperature. None: the defaults of these classes.
