@@ -18,6 +18,8 @@ InputQuantity parsed<InputQuantity>(const std::string& word) {
     return parse_input_quantity(word);
 }
 template <>
+struct InPython<InputQuantity> : AsWord<InputQuantity> {};
+template <>
 NoiseQuantity parsed<NoiseQuantity>(const std::string& word) {
     return parse_noise_quantity(word);
 }

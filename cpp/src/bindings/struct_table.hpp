@@ -10,9 +10,9 @@
 
 namespace stepdiag::bindings {
 
-// A word of Python as an enumerator; specialised for those that constructors take. Throws InvalidArgument.
-template <class Enum>
-Enum parsed(const std::string& word);
+// The value that a word of Python stands for; specialised for those that constructors take. Throws InvalidArgument.
+template <class Value>
+Value parsed(const std::string& word);
 
 // How the value of a field is taken from an argument (from), given back (of), and is a default (usual). This: as
 // pybind11 converts it.
@@ -66,15 +66,17 @@ struct InPython<Eigen::Matrix<double, rows, columns, options>> {
     }
 };
 
-// Words.
-template <class Enum>
-struct InPython<Enum, std::enable_if_t<std::is_enum_v<Enum>>> {
+// What has a word for each value.
+template <class Value>
+struct AsWord {
     static constexpr bool is_plain = false;
     using Argument = std::string;
-    static Enum from(const std::string& given, const char*) { return parsed<Enum>(given); }
-    static std::string of(Enum value) { return name(value); }
-    static std::string usual(Enum value) { return name(value); }
+    static Value from(const std::string& given, const char*) { return parsed<Value>(given); }
+    static std::string of(const Value& value) { return name(value); }
+    static std::string usual(const Value& value) { return name(value); }
 };
+template <class Enum>
+struct InPython<Enum, std::enable_if_t<std::is_enum_v<Enum>>> : AsWord<Enum> {};
 
 template <class Value>
 struct InPython<std::optional<Value>> {
