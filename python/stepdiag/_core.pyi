@@ -122,7 +122,11 @@ class Expansion:
     """
     def __init__(self, coefficient: numpy.typing.ArrayLike, *, fixed_point: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reference: typing.SupportsFloat | typing.SupportsIndex = 20.0) -> None:
         """
-        coefficient (3,) of X, Y, Z, 1/K; fixed_point (3,), mm; reference, degrees Celsius. Raises InvalidArgument for a coefficient beyond 1e-3, and for what is not finite.
+        Raises InvalidArgument for what makes no sense.
+        
+        coefficient: (3,) of X, Y, Z, 1/K, 1e-3 at most
+        fixed_point: (3,) mm
+        reference: degrees Celsius
         """
     def __repr__(self) -> str:
         ...
@@ -134,13 +138,19 @@ class Expansion:
         """
     @property
     def coefficient(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) of X, Y, Z, 1/K, 1e-3 at most
+        """
     @property
     def fixed_point(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) mm
+        """
     @property
     def reference(self) -> float:
-        ...
+        """
+        degrees Celsius
+        """
 class Machine:
     """
     A three-axis machine: chain, the 21 errors, tool offset (mm).
@@ -209,11 +219,14 @@ class PlannedPass:
         ...
 class CheckPoints:
     """
-    Returns to one point of each line but scale lines, which tell a drift from the machine's errors.
+    Returns to one point of each line but scale lines, which distinguish a drift from the machine's errors.
     """
     def __init__(self, every: typing.SupportsIndex = 0, at: typing.SupportsIndex = 0) -> None:
         """
-        every: after so many steps, each a move of every axis; 0: there are none. at: the point is that after so many steps, 0 the line's first.
+        Raises InvalidArgument for what makes no sense.
+        
+        every: After so many steps, each a move of every axis; 0: there are none.
+        at: The point is that after so many steps, 0 the line's first.
         """
     def __repr__(self) -> str:
         ...
@@ -221,10 +234,14 @@ class CheckPoints:
         ...
     @property
     def at(self) -> int:
-        ...
+        """
+        The point is that after so many steps, 0 the line's first.
+        """
     @property
     def every(self) -> int:
-        ...
+        """
+        After so many steps, each a move of every axis; 0: there are none.
+        """
 class Plan:
     """
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
@@ -512,7 +529,7 @@ class HeadCalibration:
     def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
-    def head_constants(self) -> numpy.typing.NDArray[numpy.float64]:
+    def head_constants(self) -> list[float]:
         """
         What glass and way before the reference plane add to each distance, mm; readings are corrected for it.
         """
@@ -709,11 +726,15 @@ class Head:
         ...
 class GaussianMode:
     """
-    A collimator's Gaussian mode: vacuum wavelength in nm, waist radius (1/e^2 of power) and the waist's place along the beam from the collimator's plane (t/n) in mm.
+    A collimator's Gaussian mode.
     """
     def __init__(self, wavelength: typing.SupportsFloat | typing.SupportsIndex, waist_radius: typing.SupportsFloat | typing.SupportsIndex, waist_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        Raises InvalidArgument for what is not positive or not finite.
+        Raises InvalidArgument for what makes no sense.
+        
+        wavelength: In vacuum, nm.
+        waist_radius: 1/e^2 of power, mm
+        waist_position: Along the beam from the collimator's plane, reduced (t/n), mm.
         """
     def __repr__(self) -> str:
         ...
@@ -727,7 +748,7 @@ class GaussianMode:
     @property
     def waist_position(self) -> float:
         """
-        Along the beam from its source, mm.
+        Along the beam from the collimator's plane, reduced (t/n), mm.
         """
     @property
     def waist_radius(self) -> float:
@@ -736,14 +757,21 @@ class GaussianMode:
         """
     @property
     def wavelength(self) -> float:
-        ...
+        """
+        In vacuum, nm.
+        """
 class ReturnedBeam:
     """
     A beam that has come back, in the collimator's frame (beam out along +z, its plane z = 0).
     """
     def __init__(self, position: numpy.typing.ArrayLike, direction: numpy.typing.ArrayLike, optical_length: typing.SupportsFloat | typing.SupportsIndex, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        position: (2,), where the axis meets the collimator's plane, mm; direction: (3,), unit, z < 0; optical_length and reduced_length: sums of n t and of t / n out and back, mm. Raises InvalidArgument naming what makes no sense.
+        Raises InvalidArgument for what makes no sense.
+        
+        position: (2,), where the axis meets the collimator's plane, mm
+        direction: (3,), unit, z < 0
+        optical_length: Sum of n t out and back, mm.
+        reduced_length: Sum of t/n out and back, mm.
         """
     def __repr__(self) -> str:
         ...
@@ -751,23 +779,40 @@ class ReturnedBeam:
         ...
     @property
     def direction(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,), unit, z < 0
+        """
     @property
     def optical_length(self) -> float:
-        ...
+        """
+        Sum of n t out and back, mm.
+        """
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,), where the axis meets the collimator's plane, mm
+        """
     @property
     def reduced_length(self) -> float:
-        ...
+        """
+        Sum of t/n out and back, mm.
+        """
 class Interferometer:
     """
     What an interferometer makes of the light that comes back to its collimator.
     """
     def __init__(self, *, aperture: typing.SupportsFloat | typing.SupportsIndex = 10.0, acceptance: typing.SupportsFloat | typing.SupportsIndex = 0.1, least_coupling: typing.SupportsFloat | typing.SupportsIndex = 0.0, resolution: typing.SupportsFloat | typing.SupportsIndex = 0.0, periodic_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0, dead_path: typing.SupportsFloat | typing.SupportsIndex = 0.0, index_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, reading_model: str = 'chief_ray') -> None:
         """
-        aperture: edge of the square that takes the beam back, mm; acceptance: largest angle of the returned beam, rad; least_coupling: share of the light; resolution, periodic_amplitude, dead_path: mm; index_error: relative; reading_model: "chief_ray" or "coupled_mode". Raises InvalidArgument naming the value.
+        Raises InvalidArgument for what makes no sense.
+        
+        aperture: Edge of the square that takes the beam back, mm.
+        acceptance: Largest angle of the returned beam, rad.
+        least_coupling: Share of the light.
+        resolution: mm
+        periodic_amplitude: mm
+        dead_path: mm
+        index_error: Relative.
+        reading_model: "chief_ray" or "coupled_mode".
         """
     def __repr__(self) -> str:
         ...
@@ -775,28 +820,44 @@ class Interferometer:
         ...
     @property
     def acceptance(self) -> float:
-        ...
+        """
+        Largest angle of the returned beam, rad.
+        """
     @property
     def aperture(self) -> float:
-        ...
+        """
+        Edge of the square that takes the beam back, mm.
+        """
     @property
     def dead_path(self) -> float:
-        ...
+        """
+        mm
+        """
     @property
     def index_error(self) -> float:
-        ...
+        """
+        Relative.
+        """
     @property
     def least_coupling(self) -> float:
-        ...
+        """
+        Share of the light.
+        """
     @property
     def periodic_amplitude(self) -> float:
-        ...
+        """
+        mm
+        """
     @property
     def reading_model(self) -> str:
-        ...
+        """
+        "chief_ray" or "coupled_mode".
+        """
     @property
     def resolution(self) -> float:
-        ...
+        """
+        mm
+        """
 class BeamSpot:
     """
     A beam's spot on a sensor: centre (2,) and radius (1/e^2 of power) in mm, share of the source's power.
@@ -978,11 +1039,21 @@ class Sensitivity:
         """
 class Misalignment:
     """
-    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times their offsets), drift of the distances (mm/s).
+    How head and mirror are out of true on a line.
     """
     def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0), distance_constant: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_constants: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], *, lateral: numpy.typing.ArrayLike = (0.0, 0.0), roll: typing.SupportsFloat | typing.SupportsIndex = 0.0, gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, drift: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        Raises InvalidArgument for what is no pair of finite numbers.
+        Raises InvalidArgument for what makes no sense.
+        
+        reflector: (2,) angles of the mirror a, b, rad
+        laser: (2,) angles of the laser a, b, rad
+        psd_zero: (2,) zero offset of the position sensing device, mm
+        distance_constant: What all distances read too much, mm.
+        beam_constants: What d1, d2, ... read too much, mm.
+        lateral: (2,) offset of the beam's origin, mm
+        roll: Of the head, rad.
+        gain: Tilts and spots read 1 + gain times themselves; beams stand at 1 + gain times their offsets.
+        drift: Of the distances, mm/s.
         """
     def __repr__(self) -> str:
         ...
@@ -1000,32 +1071,52 @@ class Misalignment:
         """
     @property
     def drift(self) -> float:
-        ...
+        """
+        Of the distances, mm/s.
+        """
     @property
     def gain(self) -> float:
-        ...
+        """
+        Tilts and spots read 1 + gain times themselves; beams stand at 1 + gain times their offsets.
+        """
     @property
     def laser(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,) angles of the laser a, b, rad
+        """
     @property
     def lateral(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,) offset of the beam's origin, mm
+        """
     @property
     def psd_zero(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,) zero offset of the position sensing device, mm
+        """
     @property
     def reflector(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,) angles of the mirror a, b, rad
+        """
     @property
     def roll(self) -> float:
-        ...
+        """
+        Of the head, rad.
+        """
 class Noise:
     """
-    Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm); common (mm): one draw a row, added to all of its distances.
+    Standard deviations of an independent Gaussian per reading.
     """
     def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsIndex = 0, common: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 - 1.
+        Raises InvalidArgument for what makes no sense.
+        
+        distance: mm; also of d1, ...
+        tilt: rad
+        spot: mm
+        seed: 0 to 2^64 - 1
+        common: mm: one draw a row, added to all of its distances
         """
     def __repr__(self) -> str:
         ...
@@ -1033,26 +1124,39 @@ class Noise:
         ...
     @property
     def common(self) -> float:
-        ...
+        """
+        mm: one draw a row, added to all of its distances
+        """
     @property
     def distance(self) -> float:
-        ...
+        """
+        mm; also of d1, ...
+        """
     @property
     def seed(self) -> int:
-        ...
+        """
+        0 to 2^64 - 1
+        """
     @property
     def spot(self) -> float:
-        ...
+        """
+        mm
+        """
     @property
     def tilt(self) -> float:
-        ...
+        """
+        rad
+        """
 class ScaleTemperatures:
     """
-    How warm the scales of the axes are, and how they expand. Makes the channels temperature_x, temperature_y and temperature_z, or temperature alone of one sensor.
+    How warm the scales of the axes are, and how they expand. Makes the channels temperature_x, temperature_y and temperature_z, or temperature alone of one sensor. simulate() checks it.
     """
     def __init__(self, expansion: Expansion, start: numpy.typing.ArrayLike, rate: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, one_sensor: bool = False) -> None:
         """
-        start (3,): of X, Y, Z at the run's first reading, degrees Celsius; rate (3,), K/s. simulate() checks them.
+        expansion: Of the scales.
+        start: (3,) of X, Y, Z at the run's first reading, degrees Celsius
+        rate: (3,) K/s
+        one_sensor: Whether one sensor measures for all axes.
         """
     def __repr__(self) -> str:
         ...
@@ -1070,33 +1174,56 @@ class ScaleTemperatures:
         """
     @property
     def rate(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) K/s
+        """
     @property
     def start(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) of X, Y, Z at the run's first reading, degrees Celsius
+        """
 class SimulationOptions:
     """
-    What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded; machine_drift (3,): of the functional point along the axes since the first reading, mm/s.
+    What simulate() takes beside machine, plan and head, and checks.
     """
     def __init__(self, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, scales: ScaleTemperatures | None = None, machine_drift: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """
-        Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.
+        misalignment: By line name; a line without an entry is aligned.
+        noise: Of the readings.
+        environment: The air of the trace; None: of 20 degrees Celsius for a head with a design, an index of 1 for others.
+        assumed_environment: What the readings are reduced with; None: the same.
+        verified_share: Of a traced head's replayed poses, traced again and compared.
+        repeats: How often each line is measured: runs 0, 1, 2, ...
+        backward: Runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...
+        seconds_per_reading: Makes the channel time; None: no times.
+        scales: They expand, and their temperatures are recorded.
+        machine_drift: (3,) of the functional point along the axes since the first reading, mm/s
         """
     @property
     def assumed_environment(self) -> Environment | None:
-        ...
+        """
+        What the readings are reduced with; None: the same.
+        """
     @property
     def backward(self) -> bool:
-        ...
+        """
+        Runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...
+        """
     @property
     def environment(self) -> Environment | None:
-        ...
+        """
+        The air of the trace; None: of 20 degrees Celsius for a head with a design, an index of 1 for others.
+        """
     @property
     def machine_drift(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) of the functional point along the axes since the first reading, mm/s
+        """
     @property
     def misalignment(self) -> dict[str, Misalignment]:
-        ...
+        """
+        By line name; a line without an entry is aligned.
+        """
     @property
     def noise(self) -> Noise:
         """
@@ -1104,16 +1231,24 @@ class SimulationOptions:
         """
     @property
     def repeats(self) -> int:
-        ...
+        """
+        How often each line is measured: runs 0, 1, 2, ...
+        """
     @property
     def scales(self) -> ScaleTemperatures | None:
-        ...
+        """
+        They expand, and their temperatures are recorded.
+        """
     @property
     def seconds_per_reading(self) -> float | None:
-        ...
+        """
+        Makes the channel time; None: no times.
+        """
     @property
     def verified_share(self) -> float:
-        ...
+        """
+        Of a traced head's replayed poses, traced again and compared.
+        """
 class VirtualReadout:
     """
     The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.
@@ -1132,7 +1267,14 @@ class KnownExpansion:
     """
     def __init__(self, expansion: Expansion, standard_uncertainty: numpy.typing.ArrayLike, *, one_coefficient: bool, sensor_uncertainty: typing.SupportsFloat | typing.SupportsIndex, temperature: numpy.typing.ArrayLike | None = None, one_temperature: bool = False) -> None:
         """
-        standard_uncertainty (3,): of the coefficients, 1/K; one_coefficient: it is common to the axes; sensor_uncertainty: of each sensor's constant deviation, K; temperature (3,): of the scales where the run says nothing, degrees Celsius, and whether one sensor measured it. Raises InvalidArgument.
+        Raises InvalidArgument for what makes no sense.
+        
+        expansion: Of the scales.
+        standard_uncertainty: (3,) of the coefficients, 1/K
+        one_coefficient: Whether it is common to the axes.
+        sensor_uncertainty: Standard uncertainty of each sensor's constant deviation, K.
+        temperature: (3,) of the scales where the run says nothing, degrees Celsius
+        one_temperature: Whether one sensor measured it for all axes.
         """
     def __repr__(self) -> str:
         ...
@@ -1140,10 +1282,14 @@ class KnownExpansion:
         ...
     @property
     def expansion(self) -> Expansion:
-        ...
+        """
+        Of the scales.
+        """
     @property
     def one_coefficient(self) -> bool:
-        ...
+        """
+        Whether it is common to the axes.
+        """
     @property
     def one_temperature(self) -> bool:
         """
@@ -1151,20 +1297,30 @@ class KnownExpansion:
         """
     @property
     def sensor_uncertainty(self) -> float:
-        ...
+        """
+        Standard uncertainty of each sensor's constant deviation, K.
+        """
     @property
     def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) of the coefficients, 1/K
+        """
     @property
     def temperature(self) -> numpy.typing.NDArray[numpy.float64] | None:
-        ...
+        """
+        (3,) of the scales where the run says nothing, degrees Celsius
+        """
 class ReadingUncertainty:
     """
-    Standard uncertainty of a reading where the run gives none: distance (mm; also d1 ...), tilt (rad), spot (mm).
+    Standard uncertainty of a reading where the run gives none: 1e-12 to 1e6 each.
     """
     def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, tilt: typing.SupportsFloat | typing.SupportsIndex = 1e-06, spot: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> None:
         """
-        Raises InvalidArgument for what is not within 1e-12 .. 1e6.
+        Raises InvalidArgument for what makes no sense.
+        
+        distance: mm; also of d1, ...
+        tilt: rad
+        spot: mm
         """
     def __repr__(self) -> str:
         ...
@@ -1172,20 +1328,30 @@ class ReadingUncertainty:
         ...
     @property
     def distance(self) -> float:
-        ...
+        """
+        mm; also of d1, ...
+        """
     @property
     def spot(self) -> float:
-        ...
+        """
+        mm
+        """
     @property
     def tilt(self) -> float:
-        ...
+        """
+        rad
+        """
 class PlausibleLimits:
     """
-    What a machine can be: positioning errors by the travel of their axis, positioning errors and straightnesses (translation, mm), angular errors and squarenesses (rotation, rad). A result beyond is an error; inf: no limit.
+    What a machine can be. A result beyond is an error; inf: no limit.
     """
     def __init__(self, *, positioning: typing.SupportsFloat | typing.SupportsIndex = 0.001, translation: typing.SupportsFloat | typing.SupportsIndex = 2.0, rotation: typing.SupportsFloat | typing.SupportsIndex = 0.005) -> None:
         """
-        Raises InvalidArgument for limits that are not positive.
+        Raises InvalidArgument for what makes no sense.
+        
+        positioning: Positioning errors by the travel of their axis.
+        translation: Positioning errors and straightnesses, mm.
+        rotation: Angular errors and squarenesses, rad.
         """
     def __repr__(self) -> str:
         ...
@@ -1193,13 +1359,19 @@ class PlausibleLimits:
         ...
     @property
     def positioning(self) -> float:
-        ...
+        """
+        Positioning errors by the travel of their axis.
+        """
     @property
     def rotation(self) -> float:
-        ...
+        """
+        Angular errors and squarenesses, rad.
+        """
     @property
     def translation(self) -> float:
-        ...
+        """
+        Positioning errors and straightnesses, mm.
+        """
 class Undetermined:
     """
     What the readings leave open, as data; `Calibration.undetermined` has it in words.
@@ -1750,30 +1922,41 @@ class SetupPriors:
         """
 class Smoothness:
     """
-    Standard deviations with which second differences of neighbouring nodes are known to be 0: translation (mm), rotation (rad); 0: no such knowledge. cross_validated: found for each function, not below these.
+    Standard deviations with which second differences of neighbouring nodes are known to be 0; 0: no such knowledge.
     """
     def __init__(self, *, translation: typing.SupportsFloat | typing.SupportsIndex = 0.0, rotation: typing.SupportsFloat | typing.SupportsIndex = 0.0, cross_validated: bool = False) -> None:
-        ...
+        """
+        translation: mm
+        rotation: rad
+        cross_validated: They are found for each function, not below these.
+        """
     def __repr__(self) -> str:
         ...
     def _repr_html_(self) -> str:
         ...
     @property
     def cross_validated(self) -> bool:
-        ...
+        """
+        They are found for each function, not below these.
+        """
     @property
     def rotation(self) -> float:
-        ...
+        """
+        rad
+        """
     @property
     def translation(self) -> float:
-        ...
+        """
+        mm
+        """
 class MachineDrift:
     """
-    A drift of the functional point along the axes that is no expansion of scales, in proportion to a record since the run's first reading: its rates are unknowns.
+    A drift of the functional point along the axes that is no expansion of scales, in proportion to a record since the run's first reading: its rates are unknowns. adjust() checks it.
     """
     def __init__(self, standard_uncertainty: numpy.typing.ArrayLike, *, record: str = 'time') -> None:
         """
-        standard_uncertainty (3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no drift. record: "time", or the channel of a temperature: "temperature", "temperature_x", ..., "air_temperature". adjust() checks them.
+        standard_uncertainty: (3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no drift
+        record: "time", or the channel of a temperature: "temperature", "temperature_x", ..., "air_temperature".
         """
     def __repr__(self) -> str:
         ...
@@ -1781,27 +1964,55 @@ class MachineDrift:
         ...
     @property
     def record(self) -> str:
-        ...
+        """
+        "time", or the channel of a temperature: "temperature", "temperature_x", ..., "air_temperature".
+        """
     @property
     def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no drift
+        """
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; they count in the uncertainties only. variance_components: estimates how much each channel scatters, and takes that for its noise where it is more than is stated.
+    What adjust() takes for known and unknown, and checks.
     """
     def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, machine_drift: MachineDrift | None = None, reliability: bool = False, search_faults: bool = True, distance_scale_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0, air_index_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0, variance_components: bool = True) -> None:
         """
-        adjust() checks them.
+        uncertainty: Of readings where the run states none.
+        setup: How the set-up of all lines is known.
+        setup_by_line: Line -> SetupPriors that replace the quantities that they name.
+        one_setup_per_line: All runs of a line share its set-up.
+        reversal: Tables of their own for nodes that are approached in - direction.
+        rotations: False: the machine has no angular errors.
+        smoothness: None: errors of neighbouring nodes are independent.
+        outlier_probability: Of a false alarm among a thousand tests for faults; 0: faults are named and not corrected.
+        slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that.
+        scale_uncertainty: Where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best.
+        full_covariance: Whether the calibration has the covariance of all its entries.
+        plausible: What a machine can be.
+        expansion: Of the scales; coefficients that are uncertain are unknowns.
+        machine_drift: Its rates are unknowns.
+        reliability: Also which faults the readings control.
+        search_faults: False: it is known already what is wrong with the run as a whole. Faults are not looked for; where the minimum is not reached soon, values are those that were, and rejected.
+        distance_scale_uncertainty: Relative standard uncertainty of all distances in common, by the instrument's scale; it counts in the uncertainties only.
+        air_index_uncertainty: The same, by the index of the air.
+        variance_components: Estimates how much each channel scatters, and takes that for its noise where it is more than is stated.
         """
     @property
     def air_index_uncertainty(self) -> float:
-        ...
+        """
+        The same, by the index of the air.
+        """
     @property
     def distance_scale_uncertainty(self) -> float:
-        ...
+        """
+        Relative standard uncertainty of all distances in common, by the instrument's scale; it counts in the uncertainties only.
+        """
     @property
     def expansion(self) -> KnownExpansion | None:
-        ...
+        """
+        Of the scales; coefficients that are uncertain are unknowns.
+        """
     @property
     def full_covariance(self) -> bool:
         """
@@ -1809,40 +2020,64 @@ class AdjustmentOptions:
         """
     @property
     def machine_drift(self) -> MachineDrift | None:
-        ...
+        """
+        Its rates are unknowns.
+        """
     @property
     def one_setup_per_line(self) -> bool:
-        ...
+        """
+        All runs of a line share its set-up.
+        """
     @property
     def outlier_probability(self) -> float:
-        ...
+        """
+        Of a false alarm among a thousand tests for faults; 0: faults are named and not corrected.
+        """
     @property
     def plausible(self) -> PlausibleLimits:
-        ...
+        """
+        What a machine can be.
+        """
     @property
     def reliability(self) -> bool:
-        ...
+        """
+        Also which faults the readings control.
+        """
     @property
     def reversal(self) -> bool:
-        ...
+        """
+        Tables of their own for nodes that are approached in - direction.
+        """
     @property
     def rotations(self) -> bool:
-        ...
+        """
+        False: the machine has no angular errors.
+        """
     @property
     def scale_uncertainty(self) -> bool:
-        ...
+        """
+        Where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best.
+        """
     @property
     def search_faults(self) -> bool:
-        ...
+        """
+        False: it is known already what is wrong with the run as a whole. Faults are not looked for; where the minimum is not reached soon, values are those that were, and rejected.
+        """
     @property
     def setup(self) -> SetupPriors:
-        ...
+        """
+        How the set-up of all lines is known.
+        """
     @property
     def setup_by_line(self) -> dict[str, SetupPriors]:
-        ...
+        """
+        Line -> SetupPriors that replace the quantities that they name.
+        """
     @property
     def slips(self) -> str:
-        ...
+        """
+        "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that.
+        """
     @property
     def smoothness(self) -> Smoothness | None:
         """
@@ -1850,10 +2085,14 @@ class AdjustmentOptions:
         """
     @property
     def uncertainty(self) -> ReadingUncertainty:
-        ...
+        """
+        Of readings where the run states none.
+        """
     @property
     def variance_components(self) -> bool:
-        ...
+        """
+        Estimates how much each channel scatters, and takes that for its noise where it is more than is stated.
+        """
 class SetupEstimate:
     """
     One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.
@@ -2394,7 +2633,9 @@ class Adjustment:
         """
     @property
     def calibration(self) -> Calibration:
-        ...
+        """
+        With fit and variance factor.
+        """
     @property
     def chi_square_probability(self) -> float:
         """
@@ -2437,7 +2678,9 @@ class Adjustment:
         """
     @property
     def outliers(self) -> list[Outlier]:
-        ...
+        """
+        Readings that were left out.
+        """
     @property
     def redundancy(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         """
@@ -2510,26 +2753,39 @@ class FitQuality:
         ...
 class ChangePriors:
     """
-    Standard uncertainties with which changes of a machine are known to be 0: scale (mm/mm), bow (mm), slope of an angle from end to end (rad), squareness (rad); 0: none of it.
+    Standard uncertainties with which changes of a machine are known to be 0; 0: there is none of it.
     """
     def __init__(self, *, scale: typing.SupportsFloat | typing.SupportsIndex = 3e-05, bow: typing.SupportsFloat | typing.SupportsIndex = 0.005, slope: typing.SupportsFloat | typing.SupportsIndex = 3e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 5e-05) -> None:
-        ...
+        """
+        scale: Of a positioning deviation, mm/mm.
+        bow: Of a straightness, in the middle of the travel, mm.
+        slope: Of an angle, from end to end of the travel, rad.
+        squareness: rad
+        """
     def __repr__(self) -> str:
         ...
     def _repr_html_(self) -> str:
         ...
     @property
     def bow(self) -> float:
-        ...
+        """
+        Of a straightness, in the middle of the travel, mm.
+        """
     @property
     def scale(self) -> float:
-        ...
+        """
+        Of a positioning deviation, mm/mm.
+        """
     @property
     def slope(self) -> float:
-        ...
+        """
+        Of an angle, from end to end of the travel, rad.
+        """
     @property
     def squareness(self) -> float:
-        ...
+        """
+        rad
+        """
 class ChangeTerm:
     """
     How a parameter of the machine has changed.
@@ -2762,7 +3018,7 @@ class Verification:
     @property
     def normalised(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         """
-        channel -> (n,) E_n: deviations by their expanded uncertainties (k = 2); 0 for a reading that only tells how head and mirror stood.
+        channel -> (n,) E_n: deviations by their expanded uncertainties (k = 2); 0 for a reading that only shows how head and mirror stood.
         """
     @property
     def probability(self) -> float:
@@ -2914,27 +3170,41 @@ class FunctionModel(SampleModel):
         """
 class StatisticsOptions:
     """
-    What a Monte Carlo run is to find out of its samples.
+    What a Monte Carlo run is to find out of its samples. make_bins checks it.
     """
-    def __init__(self, *, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, digits: typing.SupportsInt | typing.SupportsIndex = 2, covariance: bool = False, kept: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], joint: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] = []) -> None:
+    def __init__(self, *, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, digits: typing.SupportsIndex = 2, covariance: bool = False, kept: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], joint: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] = []) -> None:
         """
-        coverage: of intervals; digits: of standard uncertainties that matter, 1 to 3 (bins are a fifth of delta wide, JCGM 101, 7.9.2); covariance: of all outputs; kept: outputs of which every value is kept, 8 bytes each; joint: sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5). make_bins checks them.
+        coverage: Of intervals.
+        digits: Of standard uncertainties that matter, 1 to 3; bins are a fifth of delta wide (JCGM 101, 7.9.2).
+        covariance: Of all outputs.
+        kept: Outputs of which every value is kept, 8 bytes each.
+        joint: Sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5).
         """
     @property
     def covariance(self) -> bool:
-        ...
+        """
+        Of all outputs.
+        """
     @property
     def coverage(self) -> float:
-        ...
+        """
+        Of intervals.
+        """
     @property
     def digits(self) -> int:
-        ...
+        """
+        Of standard uncertainties that matter, 1 to 3; bins are a fifth of delta wide (JCGM 101, 7.9.2).
+        """
     @property
     def joint(self) -> list[list[int]]:
-        ...
+        """
+        Sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5).
+        """
     @property
     def kept(self) -> list[int]:
-        ...
+        """
+        Outputs of which every value is kept, 8 bytes each.
+        """
 class Bins:
     """
     What all parts of one Monte Carlo run share, fixed by its pilot run.
@@ -3229,11 +3499,15 @@ class UncertainQuantity:
         """
 class UncertainInput:
     """
-    An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. quantity: one of setup_quantities(), of a line (component 0, 1: a, b or x, y); "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
+    An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal.
     """
     def __init__(self, quantity: str, distribution: Distribution, *, line: str = '', part: str = '', component: typing.SupportsIndex = 0) -> None:
         """
-        Raises InvalidArgument for a quantity that is not known.
+        quantity: One of setup_quantities(), of a line (component 0, 1: a, b or x, y); "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
+        distribution: Of the deviation from the nominal value, mm, rad or the quantity's unit.
+        line: 
+        part: 
+        component: 
         """
     def __repr__(self) -> str:
         ...
@@ -3260,14 +3534,19 @@ class UncertainInput:
         ...
     @property
     def quantity(self) -> str:
-        ...
+        """
+        One of setup_quantities(), of a line (component 0, 1: a, b or x, y); "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
+        """
 class ReadingNoise:
     """
-    What is drawn for every reading or pose. quantity: "channel" (of the channel named), "common" (mm, one draw a reading for all its distances), "head_walk", "machine_walk" (mm/sqrt(s), random walks), "position" (mm), "orientation" (rad): repeatability of the machine, component x, y, z.
+    What is drawn for every reading or pose.
     """
     def __init__(self, quantity: str, distribution: Distribution, *, channel: str = '', component: typing.SupportsIndex = 0) -> None:
         """
-        Raises InvalidArgument for a quantity that is not known.
+        quantity: "channel" (of the channel named), "common" (mm, one draw a reading for all its distances), "head_walk", "machine_walk" (mm/sqrt(s), random walks), "position" (mm), "orientation" (rad): repeatability of the machine, component x, y, z.
+        distribution: Of each draw, mm or rad.
+        channel: 
+        component: 
         """
     def __repr__(self) -> str:
         ...
@@ -3291,7 +3570,9 @@ class ReadingNoise:
         """
     @property
     def quantity(self) -> str:
-        ...
+        """
+        "channel" (of the channel named), "common" (mm, one draw a reading for all its distances), "head_walk", "machine_walk" (mm/sqrt(s), random walks), "position" (mm), "orientation" (rad): repeatability of the machine, component x, y, z.
+        """
 class UncertainInputs:
     """
     What is uncertain about a virtual calibration.

@@ -84,7 +84,7 @@ std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(con
 
 }  // namespace
 
-void bind_evaluation(py::module_& m) {
+static void bind_evaluation_options(py::module_& m) {
     bind_options<KnownExpansion, 2>(
         m, "KnownExpansion",
         "What is known of the expansion of the scales. With it, positioning errors are referred to the reference "
@@ -110,6 +110,9 @@ void bind_evaluation(py::module_& m) {
         field("rotation", &PlausibleLimits::rotation, "Angular errors and squarenesses, rad."));
 
     bind_undetermined(m);
+}
+
+static void bind_calibration_found(py::module_& m) {
     bind_record(
         m, "Calibration",
         "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).",
@@ -201,6 +204,9 @@ void bind_evaluation(py::module_& m) {
         .def(
             "to_error_map", [](const Calibration& c) { return ErrorMap(to_parameter_table(c)); },
             "The calibration as a machine's errors; what is undetermined is 0 there.");
+}
+
+static void bind_evaluate(py::module_& m) {
     m.def(
         "read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"),
         "Reads a calibration CSV. Raises InvalidArgument naming file and line.");
@@ -225,6 +231,12 @@ void bind_evaluation(py::module_& m) {
           py::arg("full_covariance") = false, py::arg("plausible") = PlausibleLimits{},
           py::arg("expansion") = std::nullopt,
           "Calibration from a run by a linear method; findings are data, methods.evaluate gives them in words, too.");
+}
+
+void bind_evaluation(py::module_& m) {
+    bind_evaluation_options(m);
+    bind_calibration_found(m);
+    bind_evaluate(m);
 }
 
 }  // namespace stepdiag::bindings

@@ -536,15 +536,16 @@ Heads to_heads(const HeadLike& heads, const Plan& plan) {
     return {std::move(first), std::move(by_line)};
 }
 
-void bind_head(py::module_& m) {
+static void bind_head_calibration(py::module_& m) {
     bind_record(
         m, "HeadCalibration", "What evaluators know of a head: the constants that its readings are reduced with, mm.",
         field("psd_distance", &HeadCalibration::psd_distance,
               "Of the unfolded sensor behind the reference plane, mm, reduced: glass counts as t n_air/n; None "
               "without one."),
-        field("spot_beam", &HeadCalibration::spot_beam, "(2,) where the beam that makes the spot leaves, (u, v), mm."),
-        field("head_constants", &HeadCalibration::head_constants,
-              "What glass and way before the reference plane add to each distance, mm; readings are corrected for it."))
+        field("spot_beam", &HeadCalibration::spot_beam, "(2,) where the beam that makes the spot leaves, (u, v), mm."))
+        .def_property_readonly(
+            "head_constants", [](const HeadCalibration& c) { return to_numpy(c.head_constants); },
+            "What glass and way before the reference plane add to each distance, mm; readings are corrected for it.")
         .def_property_readonly("beam_offsets", [](const HeadCalibration& c) {
             Eigen::MatrixXd offsets(c.beam_offsets.size(), 2);
             for (std::size_t i = 0; i < c.beam_offsets.size(); ++i)
@@ -554,6 +555,9 @@ void bind_head(py::module_& m) {
 
     bind_beam(m);
     bind_sensor(m);
+}
+
+static void bind_design(py::module_& m) {
     py::class_<HeadDesign>(m, "HeadDesign", "A laser head as drawn: bodies, beams and sensors in the head's frame.")
         .def(py::init([](const std::string& name, const std::string& layout, const std::vector<HeadBody>& bodies,
                          const std::vector<HeadBeam>& beams, const std::vector<SpotSensor>& sensors, int most_hits,
@@ -575,6 +579,9 @@ void bind_head(py::module_& m) {
         .def_readonly("bodies", &HeadDesign::bodies)
         .def_readonly("beams", &HeadDesign::beams)
         .def_readonly("sensors", &HeadDesign::sensors);
+}
+
+static void bind_head_of_layout(py::module_& m) {
     py::class_<Head>(
         m, "Head",
         "A laser head by the closed definition of its layout's readings: \"ideal\" (ray-traced), \"psd\" or "
@@ -639,7 +646,14 @@ void bind_head(py::module_& m) {
             "mirror",
             [](const Head& head) { return head.mirror ? std::optional(to_numpy_vector(*head.mirror)) : std::nullopt; })
         .def_property_readonly("signals", &signal_names, "Names of the channels that the head reads.");
+}
 
+void bind_head(py::module_& m) {
+    bind_head_calibration(m);
+    bind_beam(m);
+    bind_sensor(m);
+    bind_design(m);
+    bind_head_of_layout(m);
     bind_detectors(m);
     bind_traced_head(m);
 }

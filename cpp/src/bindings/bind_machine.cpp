@@ -70,7 +70,7 @@ Approaches to_approaches(const std::string& text) {
     return approaches;
 }
 
-void bind_machine(py::module_& m) {
+static void bind_chain(py::module_& m) {
     py::class_<Chain>(m, "Chain",
                       "Kinematic chain in ISO 10791 style, workpiece to tool, such as \"[w X' b Y Z t]\"; a prime "
                       "marks an axis before the bed.")
@@ -86,7 +86,9 @@ void bind_machine(py::module_& m) {
         .def("__hash__", [](const Chain& chain) { return py::hash(py::str(chain.name())); })
         .def("__str__", &Chain::name)
         .def("__repr__", [](const Chain& chain) { return "Chain(\"" + chain.name() + "\")"; });
+}
 
+static void bind_error_map(py::module_& m) {
     py::class_<ErrorMap>(
         m, "ErrorMap",
         "The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear "
@@ -176,7 +178,9 @@ void bind_machine(py::module_& m) {
         py::arg("screw_amplitude") = 0.0,
         "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform "
         "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");
+}
 
+static void bind_expansion(py::module_& m) {
     bind_options<Expansion, 1>(
         m, "Expansion",
         "Thermal expansion of the axes' scales: position p stands at p + coefficient (T - reference)(p - fixed_point).",
@@ -192,7 +196,9 @@ void bind_machine(py::module_& m) {
             py::arg("commanded"), py::arg("temperature"),
             "What the expansion adds to the positions of X, Y, Z (3,), mm, at the scales' temperatures (3,), degrees "
             "Celsius.");
+}
 
+static void bind_virtual_machine(py::module_& m) {
     py::class_<Machine>(m, "Machine", "A three-axis machine: chain, the 21 errors, tool offset (mm).")
         .def(py::init([](const ChainLike& chain, const ErrorMap& errors, const ArrayLike& tool) {
                  return Machine(to_chain(chain), errors, to_vector3(tool, "tool"));
@@ -245,6 +251,13 @@ void bind_machine(py::module_& m) {
             },
             py::arg("commanded"), py::arg("approach") = "+++",
             "The same to first order in the errors: sum over axes of delta + theta x L.");
+}
+
+void bind_machine(py::module_& m) {
+    bind_chain(m);
+    bind_error_map(m);
+    bind_expansion(m);
+    bind_virtual_machine(m);
 }
 
 }  // namespace stepdiag::bindings

@@ -63,7 +63,7 @@ Measurement make_measurement(const std::vector<std::string>& line, const std::ve
 
 }  // namespace
 
-void bind_measurement(py::module_& m) {
+static void bind_setup_quantities(py::module_& m) {
     using Quantity = SetupQuantityRecord;
     bind_record(m, "SetupQuantity", "What a line's set-up is made of: a row of setup_quantities().",
                 field("name", &Quantity::name, "In options and files."),
@@ -89,7 +89,9 @@ void bind_measurement(py::module_& m) {
     m.def(
         "setup_quantities", [] { return to_tuple(setup_quantities); },
         "The table of set-up quantities. The first adjusted_quantity_count of them are unknowns of an adjustment.");
+}
 
+static void bind_run(py::module_& m) {
     py::class_<Measurement>(m, "Measurement",
                             "A run's readings, row by row: line, point, run, direction, commanded position (mm), and "
                             "channels in native units (mm, rad; NaN where a reading was lost).")
@@ -159,6 +161,11 @@ void bind_measurement(py::module_& m) {
     m.def("without_lost_marks", &without_lost_marks, py::arg("measurement"),
           "The measurement without distances of 0 that stand for a lost beam, as read_measurement gives it. Raises "
           "InvalidArgument naming the row of another such mark.");
+}
+
+void bind_measurement(py::module_& m) {
+    bind_setup_quantities(m);
+    bind_run(m);
 }
 
 }  // namespace stepdiag::bindings

@@ -48,7 +48,7 @@ void check_counts(const CheckPoints& points) {
 
 }  // namespace
 
-void bind_plan(py::module_& m) {
+static void bind_passes(py::module_& m) {
     bind_record(m, "PlannedPass", "One pass along a line of a plan, as Plan.passes gives it.",
                 field("line_index", &PlannedPass::line_index,
                       "The line's place among the plan's lines, then its scale lines, from 0."),
@@ -82,7 +82,9 @@ void bind_plan(py::module_& m) {
         &check_counts,
         field("every", &CheckPoints::every, "After so many steps, each a move of every axis; 0: there are none."),
         field("at", &CheckPoints::at, "The point is that after so many steps, 0 the line's first."));
+}
 
+static void bind_plan_of_lines(py::module_& m) {
     py::class_<Plan>(m, "Plan",
                      "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "
                      "of X, Y, Z: three of p n 0.")
@@ -176,6 +178,11 @@ void bind_plan(py::module_& m) {
             "smallest_mirror", [](const Plan& plan) { return to_numpy_vector(plan.smallest_mirror()); },
             "Width and height (local x and y) of the smallest mirror, centred on the functional point, (2,), mm; a "
             "beam of finite diameter needs that much more.");
+}
+
+void bind_plan(py::module_& m) {
+    bind_passes(m);
+    bind_plan_of_lines(m);
 }
 
 }  // namespace stepdiag::bindings

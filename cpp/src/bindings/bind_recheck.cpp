@@ -54,7 +54,7 @@ DoubleArray seen(const Recheck& recheck, double alpha, double power) {
     return to_numpy_vector(smallest_changes_seen(recheck, alpha, power));
 }
 
-void bind_rechecking(py::module_& m) {
+static void bind_changes(py::module_& m) {
     bind_options<ChangePriors>(
         m, "ChangePriors",
         "Standard uncertainties with which changes of a machine are known to be 0; 0: there is none of it.", nullptr,
@@ -82,6 +82,9 @@ void bind_rechecking(py::module_& m) {
                 field("channel", &PredictedReading::channel, "\"distance\", ..."),
                 field("deviation", &PredictedReading::deviation, "Read minus predicted, mm or rad."),
                 field("standard_uncertainty", &PredictedReading::standard_uncertainty, "Of the deviation."));
+}
+
+static void bind_recheck_of_run(py::module_& m) {
     bind_record(m, "Recheck", "Whether a machine has changed since its calibration, and by what.",
                 field("chi_square", &Recheck::chi_square, "Of no change at all."),
                 field("degrees_of_freedom", &Recheck::degrees_of_freedom,
@@ -119,6 +122,11 @@ void bind_rechecking(py::module_& m) {
         py::arg("priors") = ChangePriors{},
         "Whether the machine has changed since its calibration `baseline`, by readings of a short run; plan, head and "
         "options (AdjustmentOptions) are those of the readings. Raises InvalidArgument as verify does.");
+}
+
+void bind_rechecking(py::module_& m) {
+    bind_changes(m);
+    bind_recheck_of_run(m);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ void check_finite(const Misalignment& misalignment) {
 
 }  // namespace
 
-void bind_simulation(py::module_& m) {
+static void bind_simulation_options(py::module_& m) {
     bind_options<Misalignment, 5>(
         m, "Misalignment", "How head and mirror are out of true on a line.", &check_finite,
         field("reflector", &Misalignment::reflector, "(2,) angles of the mirror a, b, rad"),
@@ -64,7 +64,9 @@ void bind_simulation(py::module_& m) {
         field("scales", &SimulationOptions::scales, "They expand, and their temperatures are recorded."),
         field("machine_drift", &SimulationOptions::machine_drift,
               "(3,) of the functional point along the axes since the first reading, mm/s"));
+}
 
+static void bind_simulate(py::module_& m) {
     m.def(
         "simulate",
         [](const Machine& machine, const Plan& plan, const HeadLike& head,
@@ -110,6 +112,11 @@ void bind_simulation(py::module_& m) {
             "The head's signals (n,), mm and rad, NaN where lost, with the axes at `position` (mm). approach: the "
             "directions that the axes came from, + or - of each. row: which draws the noise takes, as the number of a "
             "simulated row; elapsed: seconds since the set-up's first reading.");
+}
+
+void bind_simulation(py::module_& m) {
+    bind_simulation_options(m);
+    bind_simulate(m);
 }
 
 }  // namespace stepdiag::bindings

@@ -26,7 +26,7 @@ NoiseQuantity parsed<NoiseQuantity>(const std::string& word) {
 
 // --- uncertain inputs ---
 
-static void bind_uncertain_inputs(py::module_& m) {
+static void bind_uncertain_quantities(py::module_& m) {
     using Quantity = UncertainQuantity;
     bind_record(m, "UncertainQuantity", "What may be uncertain about a virtual calibration.",
                 field("name", &Quantity::name),
@@ -45,7 +45,9 @@ static void bind_uncertain_inputs(py::module_& m) {
     m.def(
         "uncertain_quantities", [] { return to_tuple(uncertain_quantities()); },
         "The set-up quantities, what lines share, and the noises.");
+}
 
+static void bind_inputs_and_noise(py::module_& m) {
     bind_options<UncertainInput, 2>(
         m, "UncertainInput",
         "An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal.",
@@ -97,6 +99,11 @@ static void bind_uncertain_inputs(py::module_& m) {
                 correlations.emplace_back(correlated.members, to_numpy(correlated.correlation));
             return correlations;
         });
+}
+
+static void bind_uncertain_inputs(py::module_& m) {
+    bind_uncertain_quantities(m);
+    bind_inputs_and_noise(m);
 }
 
 // --- derived ---
@@ -442,7 +449,7 @@ Propagation propagate_linear(const ArrayLike& value, const ArrayLike& sensitivit
 
 }  // namespace
 
-static void bind_propagation(py::module_& m) {
+static void bind_propagated(py::module_& m) {
     bind_record(
         m, "Propagation",
         "Uncertainty of outputs by the law of propagation (GUM, JCGM 100), native units; arrays in the order of "
@@ -515,7 +522,9 @@ static void bind_propagation(py::module_& m) {
             "second_order_uncertainty",
             [](const Propagation& p) { return to_numpy_vector(p.second_order_uncertainty()); },
             "(m,) standard uncertainty with the squares and products of normal, independent inputs.");
+}
 
+static void bind_propagate(py::module_& m) {
     m.def("propagate_linear", &propagate_linear, py::arg("value"), py::arg("sensitivity"),
           py::arg("standard_uncertainty"), py::kw_only(), py::arg("degrees_of_freedom") = std::nullopt,
           py::arg("estimates") = std::nullopt, py::arg("names") = std::nullopt, py::arg("groups") = std::nullopt,
@@ -542,6 +551,11 @@ static void bind_propagation(py::module_& m) {
         "own covariance (noise, and set-ups that were solved for), and what the inputs of the virtual calibrations "
         "(same plan, head and evaluation) contribute is added; their reading noise is not. Raises InvalidArgument for "
         "a calibration of other parameters or nodes, and where a deviation leaves the evaluation without a result.");
+}
+
+static void bind_propagation(py::module_& m) {
+    bind_propagated(m);
+    bind_propagate(m);
 }
 
 // --- validation ---

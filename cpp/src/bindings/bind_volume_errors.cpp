@@ -31,7 +31,7 @@ DoubleArray to_rows(SixRows&& rows) {
 
 }  // namespace
 
-void bind_volume_errors(py::module_& m) {
+static void bind_volume_summary(py::module_& m) {
     bind_record(
         m, "VolumeSummary",
         "Errors e of the functional point (mm) and tilts of the tool (rad) on a grid, by the exact "
@@ -84,7 +84,9 @@ void bind_volume_errors(py::module_& m) {
         py::arg("calibration"), py::arg("points"), py::kw_only(), py::arg("tool") = std::nullopt,
         "Standard uncertainties of errors_at from the covariance of a calibration, (n, 6), mm and rad; NaN where a "
         "parameter is missing. Raises InvalidArgument without a covariance.");
+}
 
+static void bind_volume_draws(py::module_& m) {
     py::class_<VolumeDraws>(m, "VolumeDraws",
                             "Draws of figures over a volume from the joint normal distribution of a calibration's "
                             "values, to first order.")
@@ -121,6 +123,11 @@ void bind_volume_errors(py::module_& m) {
             "last five columns are of the place and the direction of the draw's largest error: the calibration's error "
             "e there along that direction, the length of e less what was drawn there, the standard uncertainty of e "
             "along the direction, and the traces of its covariance V and of V V.");
+}
+
+void bind_volume_errors(py::module_& m) {
+    bind_volume_summary(m);
+    bind_volume_draws(m);
 }
 
 }  // namespace stepdiag::bindings
