@@ -553,8 +553,6 @@ static void bind_head_calibration(py::module_& m) {
             return to_numpy(offsets);
         });
 
-    bind_beam(m);
-    bind_sensor(m);
 }
 
 static void bind_design(py::module_& m) {
