@@ -529,7 +529,7 @@ class HeadCalibration:
     def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
-    def head_constants(self) -> list[float]:
+    def head_constants(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         What glass and way before the reference plane add to each distance, mm; readings are corrected for it.
         """
