@@ -81,7 +81,8 @@ def volume(
     from stepdiag.calibration.volume import volume
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.presentation.volume import volume_report
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.volume import volume_blocks
 
     check_input(calibration)
     read = read_calibration(calibration)
@@ -102,6 +103,6 @@ def volume(
 
         click.echo(json_text(volume_object(found, calibration, trust_warnings(calibration, read))))
     else:
-        for line in volume_report(found):
+        for line in text_of(volume_blocks(found)):
             say(line)
     tell_trust(context, calibration, read)

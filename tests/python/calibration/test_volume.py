@@ -13,7 +13,8 @@ from usual import ALL_CHAINS, CHAIN
 import stepdiag as sd
 from stepdiag import _core
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
-from stepdiag.presentation.volume import volume_report
+from stepdiag.presentation.blocks import text_of
+from stepdiag.presentation.volume import volume_blocks
 
 # Both evaluate one pose; what is left is rounding of positions of up to 1 m.
 EXACT = 1e-9
@@ -149,12 +150,12 @@ def test_other_directions_of_approach_are_those_of_the_machine() -> None:
         size = np.linalg.norm(own.error(all_points(found), approach), axis=1)
         assert largest == pytest.approx(size.max(), abs=EXACT)
     worst = max(found.other_approaches.values())
-    assert any(f"largest error {1e3 * worst:.4g} µm" in row for row in volume_report(found))
+    assert any(f"largest error is {1e3 * worst:.4g} µm" in row for row in text_of(volume_blocks(found)))
     assert sd.volume(calibrate(1)).other_approaches == {}
     parts["undetermined_reversal_constants"] = ["EXX"]
     partly = sd.volume(sd.Calibration(**parts))
     assert partly.other_approaches == {}
-    assert any("not known, as not all reversal errors are" in row for row in volume_report(partly))
+    assert any("not known, as not all reversal errors are" in row for row in text_of(volume_blocks(partly)))
 
 
 def test_box_ends_and_nodes_are_in_the_grid() -> None:
@@ -174,7 +175,7 @@ def test_of_very_many_nodes_some_are_computed_and_it_is_said() -> None:
     assert set(found.grid[0].tolist()) <= set(nodes.tolist())
     assert found.grid[0][[0, -1]].tolist() == [0.0, 80.0]
     assert found.largest == pytest.approx(8e-3, rel=1e-9)
-    assert "the tables have more than 201 nodes an axis: 201 of them, evenly" in list(volume_report(found))
+    assert "the tables have more than 201 nodes an axis: 201 of them, evenly" in list(text_of(volume_blocks(found)))
     few = sd.volume(many, box=[[10, 0, 0], [20, 60, 50]], ranking=False)
     assert few.every_node
     assert few.shape[0] == 126
@@ -353,7 +354,7 @@ def test_limit_inside_the_interval_of_a_verdict_is_explained(certain: sd.Calibra
     near, far = (sd.volume(certain, ranking=False, limit=factor * limit) for factor in (1.0, 2.0))
     assert (near.verdict, far.verdict) == ("within", "within")
     assert near.interval_note
-    assert any(near.interval_note in row for row in volume_report(near))
+    assert any(near.interval_note in row for row in text_of(volume_blocks(near)))
     assert not far.interval_note
     assert not found.interval_note
 

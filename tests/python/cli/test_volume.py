@@ -43,8 +43,8 @@ def test_file_without_covariance_has_values_and_says_why_there_is_no_verdict(
 ) -> None:
     lines = said(capsys, "c.csv", "--limit", "1000")
     assert lines[0].startswith("machine: no verdict on the limit of 1000 µm: the calibration has no covariance")
-    assert any(line.startswith("largest error ") for line in lines)
-    assert any(line.startswith("no intervals: ") for line in lines)
+    assert any(line.startswith("largest error: ") for line in lines)
+    assert any(line.startswith("intervals: none: ") for line in lines)
 
 
 def test_object_has_the_values_of_the_library(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -86,7 +86,7 @@ def test_scenario_states_what_lies_between_the_nodes(
     told = sd.volume(sd.read_calibration(name), between_nodes=1e-4, ranking=False)
     assert told.between_nodes == 1e-4
     if name == "e.nc" and method == "adjustment":
-        assert any("between nodes (stated): standard uncertainty 0.7 µm" in line for line in said(capsys, name))
+        assert any("between nodes: standard uncertainty 0.7 µm (stated)" in line for line in said(capsys, name))
 
 
 def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,7 +106,7 @@ def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: py
 def test_rejected_fit_is_told_first_and_ends_with_code_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sd.read_calibration("c.nc").judged("rejected", ["it was dropped"]).write("r.nc")
     lines = said(capsys, "r.nc", "--limit", "1000", code=3)
-    assert lines[0] == "calibration REJECTED: do not use it (fit: rejected)"
+    assert lines[0] == "calibration: REJECTED: do not use it (fit: rejected)"
     assert any(line.startswith("warning: r.nc: the fit is rejected") for line in lines)
     assert printed("volume", capsys, "volume", "r.nc", "--limit", "1000", status=3)["verdict"] is None
 
@@ -114,9 +114,9 @@ def test_rejected_fit_is_told_first_and_ends_with_code_3(here: Path, capsys: pyt
 def test_doubt_about_the_calibration_is_told_before_the_machine(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sd.read_calibration("c.nc").judged("doubtful", ["more noise than stated"]).write("d.nc")
     first, second = said(capsys, "d.nc", "--limit", "1")[:2]
-    assert first == "calibration DOUBTFUL: do not rely on the stated uncertainties (fit: doubtful)"
+    assert first == "calibration: DOUBTFUL: do not rely on the stated uncertainties (fit: doubtful)"
     assert second.startswith("machine: not within 1 µm: ")
-    assert said(capsys, "c.nc", "--limit", "1")[1] == "calibration valid: the readings agree (fit: accepted)"
+    assert said(capsys, "c.nc", "--limit", "1")[1] == "calibration: valid: the readings agree (fit: accepted)"
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,11 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.volume import VolumeErrors, VolumeFigure
+from stepdiag.presentation.blocks import data_of
 from stepdiag.presentation.objects.calibration import Fit, Temperature, fit_of, temperature_of
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.quantity import Quantities, Quantity, Unit, quantities, quantity, with_interval
+from stepdiag.presentation.volume import volume_blocks
 
 
 class Without(TypedDict):
@@ -23,7 +25,7 @@ class Without(TypedDict):
     rms: Quantity
 
 
-class VolumeObject(Object, Temperature):
+class VolumeObject(Reported, Temperature):
     """Result of `stepdiag volume`."""
 
     fit: Fit
@@ -74,6 +76,7 @@ def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> V
     why = f"not determined: {', '.join(missing)}" if missing else "not known"
     return {
         **first_keys("volume", warnings),
+        "report": data_of(volume_blocks(found)),
         "fit": fit_of(found.source),
         "file": str(file),
         **temperature_of(found.source),

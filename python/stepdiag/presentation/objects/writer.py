@@ -7,6 +7,7 @@ from typing import Any, Literal
 from typing_extensions import TypedDict
 
 from stepdiag._core import __version__
+from stepdiag.presentation.blocks import BlockObject
 
 
 class Format(TypedDict):
@@ -22,6 +23,13 @@ class Object(TypedDict):
     """Version of the program"""
     format: Format
     warnings: list[str]
+
+
+class Reported(Object):
+    """The keys of an object whose command has a report."""
+
+    report: list[BlockObject]
+    """What the command says without --json, in blocks."""
 
 
 def first_keys(name: str, warnings: Sequence[str]) -> Object:

@@ -164,7 +164,7 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
     request = contents.request
     values: dict[str, Any] = {
         **report_object(contents.calibration, Path(request.calibration.name), contents.notes),
-        "format": "stepdiag report page 1",
+        "format": {"name": "stepdiag report page", "version": 2},
         "mistakes": [mistake_of(mistake) for mistake in contents.mistakes],
         "volume": volume_object(found.figures, Path(request.calibration.name), []),
     }

@@ -2,6 +2,9 @@
 
 import html
 from collections.abc import Iterable, Sequence
+from itertools import groupby
+
+from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock, VerdictBlock
 
 
 class Markup(str):
@@ -36,7 +39,7 @@ def table(
     caption: object, heading: Sequence[object], rows: Iterable[Sequence[object]], class_: str | None = None
 ) -> Markup:
     """A data table; the first cell of each row is its heading."""
-    head = element("thead", element("tr", *(element("th", cell, scope="col") for cell in heading)))
+    head = element("thead", element("tr", *(element("th", cell, scope="col") for cell in heading))) if heading else None
     body = [
         element("tr", element("th", first, scope="row"), *(element("td", cell) for cell in others))
         for first, *others in rows
@@ -61,6 +64,34 @@ def definitions(pairs: Iterable[tuple[object, object]], class_: str | None = Non
     return element(
         "dl", *(element("div", element("dt", name), element("dd", value)) for name, value in pairs), class_=class_
     )
+
+
+def sentence(text: str) -> str:
+    """A sentence of a block as a page has it."""
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def html_of(blocks: Iterable[Block]) -> Markup:
+    """Blocks as a page has them. Pictures are left out: a page draws its own."""
+    parts: list[Markup] = []
+    for kind, group in groupby(blocks, type):
+        if kind is RowBlock:
+            rows = (row for row in group if isinstance(row, RowBlock))
+            parts.append(definitions(((sentence(row.label)[:-1], sentence(row.text)) for row in rows), "lines"))
+            continue
+        for block in group:
+            match block:
+                case HeadingBlock(text):
+                    parts.append(element("h3", text))
+                case VerdictBlock(headline=headline, why=why, because=because):
+                    parts.append(element("p", element("strong", sentence(headline)), f" {sentence(why)}"))
+                    if because:
+                        parts.append(listed(map(sentence, because)))
+                case TableBlock(rows, columns, title):
+                    parts.append(table(title, columns, rows))
+                case NoteBlock(text):
+                    parts.append(element("p", sentence(text), class_="note"))
+    return markup(*parts)
 
 
 def section(identifier: str, title: object, *content: object, class_: str | None = None) -> Markup:

@@ -2,24 +2,23 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.volume import Interval, VolumeErrors, volume
-from stepdiag.findings.temperature import temperature_mark
+from stepdiag.calibration.volume import VolumeErrors, volume
 from stepdiag.parameters import AXES
 from stepdiag.presentation.page.contents import Contents
 from stepdiag.presentation.page.figure import rounded, value_table, values
-from stepdiag.presentation.page.html import Markup, element, section, table
-from stepdiag.presentation.page.numbers import NBSP, position, shown
+from stepdiag.presentation.page.html import Markup, element, html_of, section, table
+from stepdiag.presentation.page.numbers import position, shown
+from stepdiag.presentation.volume import figure_table, frame_notes, length_text, place_of_largest, why_not_known
 
 NODES: Final = 13  # of the grid along each axis
 MICRO: Final = 1e3  # µm of a mm
-MICRORADIAN: Final = 1e6  # µrad of a rad
 MOST_RANKED: Final = 5
 
 
@@ -81,25 +80,6 @@ def _ends(lines: Sequence[str], edges: FloatArray) -> list[tuple[str, list[float
     return ends
 
 
-def with_ends(value: float, interval: Interval | None) -> str:
-    """A length of mm in µm, with its 95 % interval where there is one."""
-    ends = "" if interval is None else f" (95 %: {shown(MICRO * interval[0])} to {shown(MICRO * interval[1])}{NBSP}µm)"
-    return f"{shown(MICRO * value)}{NBSP}µm{ends}"
-
-
-def place_of_largest(figures: VolumeErrors) -> str:
-    """The place of the largest error."""
-    return (
-        ", ".join(f"{axis}{NBSP}{position(p)}" for axis, p in zip(AXES, figures.largest_at, strict=True)) + f"{NBSP}mm"
-    )
-
-
-def why_not_known(figures: VolumeErrors) -> str:
-    """Which parameters are missing for the error in the volume."""
-    names = dict.fromkeys(name for axis in AXES for name in figures.missing.get(axis, ()))
-    return f"not known, because it needs what is not determined: {', '.join(names)}"
-
-
 def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> Markup:
     """The figures, the drawing with its controls, and the errors at corners and middles as a table."""
     scale = exaggeration(contents.calibration.volume, found, before)
@@ -109,13 +89,10 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
     else:
         parts = zip(AXES, figures.largest_components, strict=True)
         components = ", ".join(f"{axis} {shown(MICRO * float(e), signed=True)} µm" for axis, e in parts)
-        largest, rms = (
-            with_ends(figures.largest, figures.largest_interval),
-            with_ends(figures.rms, figures.rms_interval),
-        )
         said = (
-            f"Largest at {place_of_largest(figures)}: {largest}, with components {components}. Root mean square over "
-            f"the volume: {rms}."
+            f"Largest at {place_of_largest(figures)}: {length_text(figures.largest, figures.largest_interval)}, with "
+            f"components {components}. Root mean square over the volume: "
+            f"{length_text(figures.rms, figures.rms_interval)}."
         )
     drawing = element(
         "div",
@@ -129,7 +106,7 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
         "volume",
         "Error of the tool in the volume",
         element("p", said),
-        element("p", _what_it_is(figures), class_="note"),
+        html_of(frame_notes(figures)),
         _controls(scale, before is not None, bool(contents.lines)),
         element(
             "figure",
@@ -138,34 +115,8 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
             class_="wide",
         ),
         _ranking(figures),
-        values("values-volume", "Values in the volume", *_figures(figures), _table(found, before)),
+        values("values-volume", "Values in the volume", html_of([figure_table(figures)]), _table(found, before)),
     )
-
-
-def _what_it_is(figures: VolumeErrors) -> str:
-    text = "Actual less commanded position of the functional point; 0 at home, so it depends on that reference."
-    if figures.other_approaches:
-        worst = max(figures.other_approaches, key=figures.other_approaches.__getitem__)
-        directions = " ".join(f"{axis}{sign}" for axis, sign in zip(AXES, worst.replace("-", "−"), strict=True))
-        text += (
-            f" All axes are approached in + direction; approached in {directions}, the largest error is "
-            f"{with_ends(figures.other_approaches[worst], None)}, the most of other directions. That has no interval, "
-            "because the covariance of reversal errors is not known."
-        )
-    elif isinstance(figures.source, Calibration) and figures.source.reversal:
-        text += " All axes are approached in + direction. Not all reversal errors are known."
-    if figures.largest_interval is not None:
-        kind = "estimated from the tables" if figures.between_nodes_estimated else "stated"
-        text += f" Errors between the nodes: standard uncertainty {with_ends(figures.between_nodes, None)}, {kind}."
-    elif isinstance(figures.source, Calibration) and figures.source.covariance is None:
-        text += " There is no interval, because the file of the calibration has no covariance."
-    if isinstance(figures.source, Calibration):
-        text += f" Positioning errors: {temperature_mark(figures.source)}."
-    return text
-
-
-def _microradians(value: float) -> str:
-    return shown(MICRORADIAN * value)
 
 
 def _ranking(figures: VolumeErrors) -> Markup | None:
@@ -176,21 +127,6 @@ def _ranking(figures: VolumeErrors) -> Markup | None:
     rows = [[one.name, f"{shown(MICRO * one.largest)} µm", f"{shown(MICRO * one.rms)} µm"] for one in chosen]
     heading = ["Without", "largest error", "root mean square"]
     return table("What makes it: the error of the tool if one parameter were 0", heading, rows)
-
-
-def _figures(figures: VolumeErrors) -> Iterator[Markup]:
-    """Ranges, and the errors along the body diagonals."""
-    rows = [
-        [f"range of the error in {axis}", with_ends(one.value, one.interval)] for axis, one in figures.ranges.items()
-    ]
-    rows += [
-        [f"range of the error along the diagonal {line}", with_ends(one.value, one.interval)]
-        for line, one in figures.diagonals.items()
-    ]
-    for letter, tilt in figures.tilts.items():
-        ends = "" if tilt.interval is None else " (95 %: {} to {} µrad)".format(*map(_microradians, tilt.interval))
-        rows.append([f"largest rotation about {AXES['ABC'.index(letter)]}", f"{_microradians(tilt.value)} µrad{ends}"])
-    yield table("Figures of the volume", ["Figure", "value"], rows)
 
 
 def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:

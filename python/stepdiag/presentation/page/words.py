@@ -18,10 +18,10 @@ from stepdiag.findings.temperature import temperature_text
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
 from stepdiag.presentation.page.contents import Contents
 from stepdiag.presentation.page.header import TITLES
-from stepdiag.presentation.page.html import Markup, definitions, element, listed, markup, section, table
+from stepdiag.presentation.page.html import Markup, definitions, element, listed, markup, section, sentence, table
 from stepdiag.presentation.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
-from stepdiag.presentation.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
-from stepdiag.units import MICROMETRE
+from stepdiag.presentation.page.volume import ErrorInVolume
+from stepdiag.presentation.volume import length_text, limit_verdict, place_of_largest, why_not_known
 
 _IS_VALID: Final = {
     "accepted": "Yes. The readings agree with each other and with the described set-up. This does not say how "
@@ -124,8 +124,7 @@ def verdict_block(contents: Contents) -> Markup:
 
 
 def _sentence(note: str) -> str:
-    text = note.removeprefix("note: ")
-    return f"{text[0].upper()}{text[1:]}."
+    return sentence(note.removeprefix("note: "))
 
 
 def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
@@ -172,39 +171,25 @@ def _volume(contents: Contents, figures: VolumeErrors) -> Markup:
         return markup(f"The largest error is {why_not_known(figures)}.")
     parts: list[object] = [
         "The largest distance of the tool from its commanded position is ",
-        element("strong", with_ends(figures.largest, figures.largest_interval)),
+        element("strong", length_text(figures.largest, figures.largest_interval)),
         f", at {place_of_largest(figures)}; ",
-        f"{with_ends(figures.rms, figures.rms_interval)} rms over the volume.",
+        f"{length_text(figures.rms, figures.rms_interval)} rms over the volume.",
     ]
     if contents.change is not None and not math.isnan(contents.change.largest.a):
-        parts.append(f" Before: {with_ends(contents.change.largest.a, contents.change.largest.a_interval)}.")
+        parts.append(f" Before: {length_text(contents.change.largest.a, contents.change.largest.a_interval)}.")
     return markup(*parts)
 
 
 def _within(figures: VolumeErrors) -> tuple[str, object]:
     """The machine against the limit that was given, and what the answer rests on."""
-    if figures.limit is None:
+    verdict = limit_verdict(figures)
+    if verdict is None:
         return "Is the machine within its limit?", "Not asked: the report was made without a limit."
-    if figures.verdict is None or figures.bounds is None:
-        verdict, why = "Not known", _sentence(figures.no_verdict_because)
-    else:
-        above, below = (f"{bound / MICROMETRE:.4g}{NBSP}µm" for bound in figures.bounds)
-        verdict, why = {
-            "within": ("Yes", f"The largest error is below {below} (95 %)."),
-            "not within": ("No", f"The largest error is above {above} (95 %)."),
-            "undecided": (
-                "Cannot be decided",
-                f"The largest error is above {above} and below {below} (95 % each).",
-            ),
-        }[figures.verdict]
-    if figures.interval_note:
-        why += f" {_sentence(figures.interval_note)}"
+    notes = [sentence(figures.interval_note)] if figures.interval_note else []
     if figures.verdict is not None and figures.fit != "accepted":
-        why += f" {_RESTS_ON[figures.fit]}"
-        verdict += f" ({figures.fit or 'validity not known'})"
-    return (
-        f"Is the machine within {figures.limit / MICROMETRE:.4g}{NBSP}µm?",
-        markup(element("strong", f"{verdict}."), f" {why}"),
+        notes.append(_RESTS_ON[figures.fit])
+    return f"Is the machine within {1e3 * (figures.limit or 0.0):.4g} µm?", markup(
+        element("strong", sentence(verdict.headline)), f" {' '.join([sentence(verdict.why), *notes])}"
     )
 
 
@@ -395,9 +380,9 @@ def comparison_section(contents: Contents) -> Markup | None:
     volume = [
         [
             name,
-            with_ends(figure.a, figure.a_interval),
-            with_ends(figure.b, figure.b_interval),
-            with_ends(figure.change, figure.interval),
+            length_text(figure.a, figure.a_interval),
+            length_text(figure.b, figure.b_interval),
+            length_text(figure.change, figure.interval),
             "" if "rejected" in (comparison.a.fit, comparison.b.fit) else figure.verdict or "",
         ]
         for name, figure in (("largest", change.largest), ("root mean square", change.rms))
@@ -405,8 +390,8 @@ def comparison_section(contents: Contents) -> Markup | None:
     effects = [
         [
             one.parameter,
-            with_ends(one.largest, None),
-            with_ends(one.rms, None),
+            length_text(one.largest, None),
+            length_text(one.rms, None),
             "significant" if one.significant else "",
         ]
         for one in change.effects[:MOST_EFFECTS]
@@ -461,5 +446,5 @@ def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:
     if math.isnan(figure.change):
         return "Whether the error in the volume has changed is not known."
     way = "smaller" if figure.change < 0.0 else "larger"
-    said = f"The largest error in the volume is {with_ends(abs(figure.change), None)} {way} than before."
+    said = f"The largest error in the volume is {length_text(abs(figure.change), None)} {way} than before."
     return f"{said} {figure.verdict.capitalize()}." if figure.verdict else said

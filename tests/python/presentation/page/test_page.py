@@ -139,9 +139,9 @@ def test_curves_and_volume_say_for_which_temperature_they_are(evaluated: Path) -
     Path("referred.csv").write_text("".join([lines[0], "# temperature_reference_c=20.0\n", *lines[1:]]))
     page = page_of(calibration=Path("referred.csv"), before=Path("found.csv"))
     assert "Positioning errors: referred to 20 °C; before: as found at X 23.1, Y 23.0, Z 22.8 °C." in page.text
-    assert "Positioning errors: referred to 20 °C. " in page.text
+    assert "Temperature Positioning errors are referred to 20 °C." in page.text
     assert page.values()["volume"]["temperature_reference"]["value"] == 20.0
-    assert page_of(calibration=Path("calibration.csv")).text.count("Positioning errors: temperature not recorded.") == 2
+    assert page_of(calibration=Path("calibration.csv")).text.count("Temperature No temperature was recorded") == 1
 
 
 def test_temperatures_are_those_of_the_run(here: Path) -> None:
@@ -176,10 +176,10 @@ def test_both_directions_of_approach_are_drawn_and_told(here: Path) -> None:
         np.testing.assert_allclose(trace["y"], factor * value, rtol=0.0, atol=5.1e-5)  # rounded to 0.1 nm
     found = sd.volume(calibration)
     if calibration.undetermined_reversal_constants:
-        assert "Not all reversal errors are known." in page.text
+        assert "Not known, as not all reversal errors are." in page.text
     else:
-        largest = shown(1e3 * max(found.other_approaches.values()))
-        assert re.search(rf"approached in X[+−] Y[+−] Z[+−], the largest error is {largest}", page.text)
+        largest = f"{1e3 * max(found.other_approaches.values()):.4g}"
+        assert re.search(rf"Approached in X[+-] Y[+-] Z[+-], the largest error is {largest} µm", page.text)
     assert page.values()["volume"]["other_approaches"].keys() == found.other_approaches.keys()
 
 
@@ -231,10 +231,10 @@ def test_verdict_is_the_first_thing_that_is_said(fit: str, evaluated: Path) -> N
 @pytest.mark.parametrize(
     ("fit", "is_valid", "of_machine"),
     [
-        ("accepted", "Yes.", "No. The largest error is above"),
-        ("doubtful", "Doubtful.", "No (doubtful). The largest error is above"),
-        ("unchecked", "Unchecked.", "No (unchecked). The largest error is above"),
-        ("rejected", "No.", "Not known."),
+        ("accepted", "Yes.", "Not within 1 µm. The largest error is above"),
+        ("doubtful", "Doubtful.", "Not within 1 µm. The largest error is above"),
+        ("unchecked", "Unchecked.", "Not within 1 µm. The largest error is above"),
+        ("rejected", "No.", "No verdict on the limit of 1 µm."),
     ],
 )
 def test_calibration_and_machine_are_asked_about_by_name(
@@ -244,6 +244,7 @@ def test_calibration_and_machine_are_asked_about_by_name(
     sd.read_calibration("calibration.nc").judged(fit, ["x"]).write("judged.nc")
     text = page_of(calibration=Path("judged.nc"), limit=0.001).text
     assert f"The machine Is the machine within 1 µm? {of_machine}" in text
+    assert (f"The calibration is {fit}: do not rely on this answer." in text) == (fit == "doubtful")
     assert f"The calibration Is this calibration valid? {is_valid}" in text
     assert ("This does not say how accurate the machine is." in text) == (fit == "accepted")
     without = page_of(calibration=Path("judged.nc")).text
@@ -373,7 +374,9 @@ def test_error_in_the_volume_is_that_of_the_volume_command(evaluated: Path, caps
     drawn = json.loads(page.scripts["stepdiag-volume"])
     # Drawings are rounded to 0.1 nm.
     np.testing.assert_allclose(drawn["worst"]["error_um"], 1e3 * found.largest_components, rtol=0.0, atol=5.1e-5)
-    assert re.search(r"Is the machine within 20 µm\? No\. The largest error is above \d+\.\d+ µm \(95 %\)", page.text)
+    assert re.search(
+        r"Is the machine within 20 µm\? Not within 20 µm\. The largest error is above \d+\.\d+ µm \(95 %\)", page.text
+    )
     for wrong in (0.0, -1.0, float("nan")):
         with pytest.raises(InvalidArgument, match="`limit`: expected a length "):
             page_of(calibration=Path("calibration.nc"), limit=wrong)
