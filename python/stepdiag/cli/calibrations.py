@@ -114,7 +114,8 @@ def report(
     from stepdiag.findings.temperature import workpiece_rows
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
-    from stepdiag.presentation.calibration import calibration_report, functional_point_csv
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.calibration import calibration_blocks, functional_point_csv
 
     if len(calibrations) > 2:
         raise InvalidArgument(f"expected one calibration, or an earlier one before it, got {len(calibrations)}")
@@ -144,7 +145,7 @@ def report(
 
         click.echo(json_text(report_object(read, calibration, trust_warnings(calibration, read))))
     else:
-        for line in calibration_report(read):
+        for line in text_of(calibration_blocks(read)):
             say(line)
         if workpiece_expansion is not None and workpiece_temperature is not None:
             for line in workpiece_rows(read, workpiece_expansion, workpiece_temperature):
@@ -215,7 +216,8 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.file_kind import kind_of_file
     from stepdiag.io.whole_files import check_input
-    from stepdiag.presentation.comparison import comparison_report
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.comparison import comparison_blocks
 
     written = None if output is None else output.claim(a, b)
     if not 0.0 < limit < 1.0:
@@ -242,7 +244,7 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
 
         click.echo(json_text(comparison_object(comparison, change, (a, b), warnings)))
     else:
-        for line in comparison_report(comparison, change, str(a), str(b)):
+        for line in text_of(comparison_blocks(comparison, change, str(a), str(b))):
             say(line)
     for warning in warnings:
         tell("warning", warning)
@@ -280,7 +282,8 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     from stepdiag.findings.faults import fault_text
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
-    from stepdiag.presentation.verification import agrees, verification_report
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.verification import agrees, verification_blocks
     from stepdiag.rechecking.verification import check_other_run, verify
     from stepdiag.scenario.description import read_scenario
 
@@ -309,7 +312,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
         files = (calibration, run)
         click.echo(json_text(verification_object(verification, tested, measurement, alpha, files, warnings)))
     else:
-        for line in verification_report(verification, measurement, alpha):
+        for line in text_of(verification_blocks(verification, measurement, alpha)):
             say(line)
     for warning in warnings:
         tell("warning", warning)
@@ -362,7 +365,8 @@ def recheck(
     from stepdiag.findings.faults import fault_text
     from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.presentation.verification import recheck_report
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.verification import recheck_blocks
     from stepdiag.rechecking.recheck import Judged, recheck
     from stepdiag.rechecking.verification import check_other_run
     from stepdiag.scenario.description import read_scenario
@@ -399,7 +403,7 @@ def recheck(
 
         click.echo(json_text(recheck_object(judged, measurement, after, (baseline, run, target), warnings)))
     else:
-        for line in recheck_report(judged, measurement, after):
+        for line in text_of(recheck_blocks(judged, measurement, after)):
             say(line)
     for warning in warnings:
         tell("warning", warning)

@@ -86,7 +86,8 @@ def evaluate(
     from stepdiag.findings.temperature import temperature_warnings
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.presentation.evaluation import evaluation_report
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.evaluation import evaluation_blocks
     from stepdiag.scenario.description import JudgedEvaluation, read_scenario
     from stepdiag.scenario.provenance import provenance_of
 
@@ -123,7 +124,7 @@ def evaluate(
         files, warnings = evaluated_files(scenario, run, path), [*of_inputs, *trust_warnings(path, written)]
         click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings, mistakes)))
     else:
-        for line in evaluation_report(result, measurement, known, mistakes):
+        for line in text_of(evaluation_blocks(result, measurement, known, mistakes)):
             say(line)
     for warning in of_inputs:
         tell("warning", warning)
@@ -166,8 +167,9 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.fault_control import extensions, tells_all
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
-    from stepdiag.presentation.fault_control import control_rows, extension_rows
-    from stepdiag.presentation.observation import observation_report, prospect_csv, prospect_rows
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.fault_control import control_blocks, extension_blocks
+    from stepdiag.presentation.observation import observation_blocks, prospect_blocks, prospect_csv
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
@@ -177,12 +179,12 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     with Progress("observe"):
         run, found = observe(described)
     if not as_json:
-        for line in [*observation_report(found, run, known), *control_rows(found.reliability)]:
+        for line in text_of([*observation_blocks(found, run, known), *control_blocks(found.reliability)]):
             say(line)
     with Progress("larger plans"):
         tried = [] if tells_all(found.reliability) else list(extensions(known))
     if not as_json:
-        for line in extension_rows(found.reliability, tried):
+        for line in text_of(extension_blocks(found.reliability, tried)):
             say(line)
     with Progress("numbers of steps") as progress:
         table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps], progress)
@@ -192,8 +194,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
 
         click.echo(json_text(observation_object(found, run, known, tried, table)))
     else:
-        click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
-        for line in prospect_rows(table):
+        for line in text_of(prospect_blocks(table)):
             say(line)
     if path is not None:
         write_whole(path, prospect_csv(table))

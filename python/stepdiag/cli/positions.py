@@ -59,7 +59,8 @@ def positions(
     from stepdiag.io.file_kind import kind_of_file
     from stepdiag.io.whole_files import check_input
     from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
-    from stepdiag.presentation.positions import predicted_report
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.positions import predicted_blocks
 
     check_input(file)
     given = {"axis": axis, "at": at, "diagonal": diagonal, "from": start, "to": end, "points": points, "tool": tool}
@@ -96,7 +97,7 @@ def positions(
 
         click.echo(json_text(predicted_object(calibration, predicted, file, trust_warnings(file, calibration))))
     else:
-        for text in predicted_report(calibration, predicted):
+        for text in text_of(predicted_blocks(calibration, predicted)):
             say(text)
     tell_trust(context, file, calibration)
 
@@ -104,7 +105,8 @@ def positions(
 def _evaluate(file: Path, as_json: bool) -> None:
     from stepdiag.positions.evaluation import evaluate_positions
     from stepdiag.positions.readings import read_positions
-    from stepdiag.presentation.positions import measured_report, measured_warnings
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.positions import measured_blocks, measured_warnings
 
     readings = read_positions(file)
     try:
@@ -118,7 +120,7 @@ def _evaluate(file: Path, as_json: bool) -> None:
 
         click.echo(json_text(measured_object(result, file, warnings)))
     else:
-        for text in measured_report(result):
+        for text in text_of(measured_blocks(result)):
             say(text)
     for warning in warnings:
         tell("warning", warning)

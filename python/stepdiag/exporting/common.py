@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
 from stepdiag.exporting.options import Approach, ExportOptions
-from stepdiag.findings.temperature import temperature_rows
+from stepdiag.findings.temperature import temperature_text
 from stepdiag.parameters import AXES
 
 FloatArray = npt.NDArray[np.float64]
@@ -56,8 +56,7 @@ def undetermined_of(calibration: Calibration, names: Sequence[str]) -> Iterator[
 
 def temperature_row(calibration: Calibration) -> str:
     """For which temperature a table is."""
-    (row,) = temperature_rows(calibration)
-    return row
+    return f"temperature: {temperature_text(calibration)}"
 
 
 def in_ascii(text: str) -> str:

@@ -220,7 +220,7 @@ def _heading(measurement: Measurement, adjustment: Adjustment | None, name: str)
 
 
 def _notes(adjustment: Adjustment | None) -> list[str]:
-    return [] if adjustment is None else list(fault_rows(adjustment.faults))
+    return [] if adjustment is None else [": ".join(row) for row in fault_rows(adjustment.faults)]
 
 
 def _handles(

@@ -6,10 +6,10 @@ from stepdiag._core import Fault, FaultClass
 from stepdiag.units import MICRO
 
 
-def fault_rows(faults: Sequence[FaultClass]) -> Iterator[str]:
-    """Each class of faults, and what was done about it."""
+def fault_rows(faults: Sequence[FaultClass]) -> Iterator[tuple[str, str]]:
+    """Each class of faults by its number, and what was done about it."""
     for number, found in enumerate(faults, 1):
-        yield f"fault {number}: {fault_text(found)}"
+        yield f"fault {number}", fault_text(found)
 
 
 def fault_text(found: FaultClass) -> str:

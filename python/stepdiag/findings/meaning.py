@@ -2,8 +2,7 @@
 
 docs/conventions.md, "Verdict of a fit", has the definition."""
 
-from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 from stepdiag._core import Calibration
 
@@ -38,13 +37,13 @@ UNVERIFIED: Final = (
 FITS: Final = ("accepted", "unchecked", "doubtful", "rejected")
 # Of calibrations by linear methods, whose uncertainties know of nothing else.
 NOISE_ALONE: Final = {
-    "conventional": "note: uncertainties are of noise alone: what rotations, laser and mirror do to distances is "
+    "conventional": "uncertainties are of noise alone: what rotations, laser and mirror do to distances is "
     "neither in them nor corrected",
-    "enhanced": "note: uncertainties are of noise alone: what laser and mirror angles do at second order is "
+    "enhanced": "uncertainties are of noise alone: what laser and mirror angles do at second order is "
     "neither in them nor corrected",
 }
 # Of what is accepted.
-NOT_SEEN: Final = "note: a good fit does not prove that wavelength, temperature, tool offset and place of b are right"
+NOT_SEEN: Final = "a good fit does not prove that wavelength, temperature, tool offset and place of b are right"
 
 
 def is_valid(calibration: Calibration) -> bool:
@@ -61,36 +60,47 @@ def headline(calibration: Calibration, which: str = "Calibration") -> str:
     return f"{which} {HEADLINE[calibration.fit]}. Unverified"
 
 
-def fit_row(calibration: Calibration) -> str:
-    """What the file of a calibration says of its fit."""
+class FitWords(NamedTuple):
+    """A verdict of a fit in words, without full stops.
+
+    because: its reasons, as far as `said` has none. notes: label and sentence, of what goes with it."""
+
+    fit: str
+    said: str
+    because: tuple[str, ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+
+
+def fit_words(calibration: Calibration) -> FitWords:
+    """What the file of a calibration says of its fit, with what no verdict tells."""
+    notes = [("unverified", UNVERIFIED.partition(": ")[2])] if calibration.unverified else []
+    if calibration.uncertainty_scaled is not None:
+        notes.append(("note", f"all standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}"))
+    if calibration.method in NOISE_ALONE:
+        notes.append(("note", NOISE_ALONE[calibration.method]))
+    if calibration.fit == "accepted":
+        notes.append(("note", NOT_SEEN))
+    reasons = tuple(calibration.fit_reasons)
+    return FitWords(calibration.fit or "not known", _said(calibration), reasons, tuple(notes))
+
+
+def _said(calibration: Calibration) -> str:
     if calibration.fit is None:
-        return "fit: not known"
+        return "not known"
     factor = calibration.variance_factor
     figures = "" if factor is None else f" (variance factor {factor:.3g})"
-    return f"fit: {fit_word(calibration.fit)}: {MEANING[calibration.fit]}{figures}"
+    return f"{fit_word(calibration.fit)}: {MEANING[calibration.fit]}{figures}"
 
 
 def trust_rows(calibration: Calibration) -> list[str]:
-    """The same, and whether the calibration is unverified."""
-    return [fit_row(calibration), *([UNVERIFIED] if calibration.unverified else [])]
+    """The verdict in one line, and whether the calibration is unverified."""
+    return [f"fit: {_said(calibration)}", *([UNVERIFIED] if calibration.unverified else [])]
 
 
 def unverified_key(calibration: Calibration) -> dict[str, str]:
     """The key of a file that says that its calibration is unverified."""
     key, text = UNVERIFIED.split(": ")
     return {key: text} if calibration.unverified else {}
-
-
-def fit_rows(calibration: Calibration) -> Iterator[str]:
-    """The same with the reasons of the fit, and what no verdict tells."""
-    yield from trust_rows(calibration)
-    yield from (f"{calibration.fit} because {reason}" for reason in calibration.fit_reasons)
-    if calibration.uncertainty_scaled is not None:
-        yield f"note: all standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}"
-    if calibration.method in NOISE_ALONE:
-        yield NOISE_ALONE[calibration.method]
-    if calibration.fit == "accepted":
-        yield NOT_SEEN
 
 
 def provenance_rows(calibration: Calibration) -> list[str]:

@@ -13,11 +13,6 @@ STEEL: Final = 11.5  # µm/(m K)
 MATTERS: Final = 0.1  # K: below it nothing is worth a warning
 
 
-def temperature_rows(calibration: Calibration) -> Iterator[str]:
-    """One line."""
-    yield f"temperature: {temperature_text(calibration)}"
-
-
 def temperature_text(calibration: Calibration) -> str:
     """To which temperature positioning errors belong; without a full stop."""
     if calibration.temperature_reference is not None:

@@ -1,10 +1,10 @@
 """How large a fault of the readings may be in a calibration without being seen, and what it then does, in words."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-from stepdiag._core import Calibration, UnseenFault
+from stepdiag._core import UnseenFault
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
 from stepdiag.units import report_value
 
@@ -35,14 +35,11 @@ def unseen_texts(faults: Sequence[UnseenFault], largest_uncertainties: Mapping[K
     return texts
 
 
-def unseen_rows(calibration: Calibration) -> Iterator[str]:
-    """What the file of a calibration says of it."""
-    for sentence in calibration.unseen_faults:
-        yield f"unseen: {sentence}"
-    if calibration.unseen_faults:
-        # Sizes and effects are lower bounds: diagnosis/reliability looks at a part of the slips.
-        yield "  (one at a time, from a part of the possible faults: the true sizes and effects may be larger;"
-        yield "  evaluate --reliability computes all, stepdiag observe names the plan that would tell more)"
+# Sizes and effects are lower bounds: diagnosis/reliability looks at a part of the slips.
+ONE_AT_A_TIME: Final = (
+    "one at a time, from a part of the possible faults: the true sizes and effects may be larger; evaluate "
+    "--reliability computes all, stepdiag observe names a plan that shows more"
+)
 
 
 def _text(fault: UnseenFault, u: Mapping[Kind, float]) -> tuple[bool, str]:

@@ -3,39 +3,44 @@
 from collections.abc import Iterator
 
 from stepdiag._core import Adjustment, FitReason
-from stepdiag.findings.meaning import MEANING, NOT_SEEN, fit_word
+from stepdiag.findings.meaning import MEANING, NOT_SEEN, FitWords, fit_word
 from stepdiag.findings.reasons import UNCHECKED, reason_texts
 
 
-def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
+def verdict_words(adjustment: Adjustment) -> FitWords:
     """The verdict of an adjustment with its reasons, and what no verdict tells."""
     verdict = adjustment.verdict
     if verdict.fit == "unchecked":
-        yield f"fit: unchecked: {UNCHECKED[verdict.reasons[0].finding]}"
-        return
+        return FitWords("unchecked", f"unchecked: {UNCHECKED[verdict.reasons[0].finding]}")
     reasons = reason_texts(verdict.reasons)
     is_noise = bool(verdict.reasons) and _is_noise_of_channel(verdict.reasons[0])
     said = reasons.pop(0) if verdict.fit == "doubtful" or is_noise else MEANING[verdict.fit]
     corrected = f"; {_corrected(adjustment)}" if verdict.fit == "accepted" and adjustment.faults else ""
-    yield (
-        f"fit: {fit_word(verdict.fit)}{corrected}: {said} (variance factor {adjustment.variance_factor:.3g} with "
-        f"{adjustment.degrees_of_freedom} degrees of freedom, {_probability(adjustment.chi_square_probability)})"
+    figures = (
+        f"variance factor {adjustment.variance_factor:.3g} with {adjustment.degrees_of_freedom} degrees of freedom, "
+        f"{_probability(adjustment.chi_square_probability)}"
     )
-    yield from (f"{verdict.fit} because {reason}" for reason in reasons)
+    said = f"{fit_word(verdict.fit)}{corrected}: {said} ({figures})"
+    return FitWords(verdict.fit, said, tuple(reasons), tuple(_notes(adjustment)))
+
+
+def _notes(adjustment: Adjustment) -> Iterator[tuple[str, str]]:
+    verdict = adjustment.verdict
     if any(component.used for component in adjustment.variance_components):
         yield (
-            "note: the uncertainties are of this noise; if it is what these channels have, state it in [uncertainty]"
+            "note",
+            "the uncertainties are of this noise; if it is what these channels have, state it in [uncertainty]",
         )
     elif [reason.finding for reason in verdict.reasons] == ["misfit"]:
         yield (
-            "remedy: no line, channel, time or position scatters unlike the others; if the noise is what it is, "
-            "[adjustment] scale_uncertainty = true multiplies all uncertainties by "
-            f"{verdict.reasons[0].value:.3g}"
+            "remedy",
+            "no line, channel, time or position scatters unlike the others; if this is the usual noise, [adjustment] "
+            f"scale_uncertainty = true multiplies all uncertainties by {verdict.reasons[0].value:.3g}",
         )
     if any(found.treatment == "estimated" for found in adjustment.faults) and verdict.fit == "rejected":
-        yield "note: the values come from a fit in which the faults named below are unknowns; they rest on that"
+        yield "note", "the values come from a fit in which the faults named below are unknowns; they rest on that"
     if verdict.fit == "accepted":
-        yield NOT_SEEN
+        yield "note", NOT_SEEN
 
 
 def _corrected(adjustment: Adjustment) -> str:

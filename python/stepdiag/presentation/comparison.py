@@ -1,4 +1,4 @@
-"""A comparison of two calibrations as text, as CSV and as a labelled table."""
+"""A comparison of two calibrations in blocks, as CSV and as a labelled table."""
 
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
@@ -17,7 +17,7 @@ from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.whole_files import write_whole
 from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
-from stepdiag.presentation.text_columns import text_columns
+from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock
 from stepdiag.units import report_value
 
 if TYPE_CHECKING:
@@ -26,60 +26,63 @@ if TYPE_CHECKING:
 EFFECTS_SHOWN: Final = 5
 
 
-def comparison_report(comparison: Comparison, change: VolumeChange, name_a: str, name_b: str) -> Iterator[str]:
+def comparison_blocks(comparison: Comparison, change: VolumeChange, name_a: str, name_b: str) -> Iterator[Block]:
     """What is compared, what it means in the volume, a table by parameter with the significant ones marked, and what
     cannot be compared."""
-    yield f"A: {name_a}: {_described(comparison.a)}"
-    yield f"B: {name_b}: {_described(comparison.b)}"
+    yield RowBlock("A", f"{name_a}: {_described(comparison.a)}")
+    yield RowBlock("B", f"{name_b}: {_described(comparison.b)}")
     a = comparison.a
     volume, tool = (" x ".join(f"{edge:g}" for edge in a.volume), " ".join(f"{offset:g}" for offset in a.tool))
-    yield f"machine: chain {a.chain}, volume {volume} mm, tool offset {tool} mm"
-    yield ""
-    yield from _volume_rows(change)
-    yield ""
+    yield RowBlock("machine", f"chain {a.chain}, volume {volume} mm, tool offset {tool} mm")
+    yield HeadingBlock("error of the tool in the volume")
+    yield from _volume_blocks(change)
     if comparison.agreement is not None:
+        yield HeadingBlock("agreement with the error map")
         yield from _agreement_rows(comparison.agreement)
-        yield ""
-    yield f"{'':<19}{'largest difference':>30}   {'most significant difference':>33}"
-    yield f"{'':<19}{'B - A':>10}{'u':>10}{'at mm':>10}   {'(B - A)/u':>10}{'at mm':>10}{'probability':>13}"
-    for difference in comparison.differences:
-        yield _row(comparison, difference)
-    yield ""
+    yield HeadingBlock("differences by parameter: the largest, and the most significant")
+    yield TableBlock(
+        tuple(_row(comparison, difference) for difference in comparison.differences),
+        ("", "B - A", "u", "at mm", "(B - A)/u", "at mm", "probability", ""),
+        left=(0, 7),
+    )
+    yield HeadingBlock("how to read it")
     yield from _rules(comparison)
 
 
-def _volume_rows(change: VolumeChange) -> Iterator[str]:
-    rows: list[tuple[str, ...]] = [("error of the tool in the volume", "A", "B", "B - A", "95 %", "")]
+def _volume_blocks(change: VolumeChange) -> Iterator[Block]:
+    rows = []
     for name, figure in (("largest", change.largest), ("rms", change.rms)):
         interval = "-" if figure.interval is None else " to ".join(map(_micrometres, figure.interval))
         values = map(_micrometres, (figure.a, figure.b, figure.change))
         rows.append((name, *values, interval, f"µm  {figure.verdict or ''}"))
-    yield from text_columns(rows, left=(0, 5))
+    yield TableBlock(tuple(rows), ("", "A", "B", "B - A", "95 %", ""), left=(0, 5))
     if change.no_verdict_because:
-        yield f"no verdict: {change.no_verdict_because}"
-    rows = [("errors that differences make alone", "largest", "rms", "")]
+        yield RowBlock("no verdict", change.no_verdict_because)
+    rows = []
     for effect in change.effects[:EFFECTS_SHOWN]:
         mark = "µm  significant" if effect.significant else "µm"
         rows.append((effect.parameter, _micrometres(effect.largest), _micrometres(effect.rms), mark))
-    if len(rows) > 1:
-        yield from text_columns(rows, left=(0, 3))
+    if rows:
+        yield TableBlock(tuple(rows), ("differences alone", "largest", "rms", ""), left=(0, 3))
 
 
-def _agreement_rows(agreement: TruthAgreement) -> Iterator[str]:
+def _agreement_rows(agreement: TruthAgreement) -> Iterator[Block]:
     if not agreement.values:
-        yield "agreement with the error map: not known, because the calibration has no standard uncertainties"
+        yield RowBlock("values", "not known, because the calibration has no standard uncertainties")
         return
     share = 100.0 * agreement.beyond_two / agreement.values
-    yield (
-        f"agreement with the error map: {agreement.beyond_two} of {agreement.values} values beyond 2 u "
-        f"({share:.1f} %; 4.6 % expected), rms {agreement.rms:.3g} u"
+    yield RowBlock(
+        "values",
+        f"{agreement.beyond_two} of {agreement.values} values beyond 2 u ({share:.1f} %; 4.6 % expected), rms "
+        f"{agreement.rms:.3g} u",
     )
     if agreement.chi_square is None or agreement.probability is None:
-        yield "chi-square: not known, because the calibration has no covariance (write it as .nc)"
+        yield RowBlock("chi-square", "not known, because the calibration has no covariance (write it as .nc)")
     else:
-        yield (
-            f"chi-square: {agreement.chi_square:.4g} with {agreement.degrees_of_freedom} degrees of freedom, "
-            f"probability of a larger one {agreement.probability:.3g}"
+        yield RowBlock(
+            "chi-square",
+            f"{agreement.chi_square:.4g} with {agreement.degrees_of_freedom} degrees of freedom, probability of a "
+            f"larger one {agreement.probability:.3g}",
         )
 
 
@@ -94,61 +97,66 @@ def _described(calibration: Calibration) -> str:
     )
 
 
-def _row(comparison: Comparison, difference: Difference) -> str:
+def _row(comparison: Comparison, difference: Difference) -> tuple[str, ...]:
     kind = kind_of(difference.parameter)
     k, worst = difference.largest, difference.most_significant
     value, u = (in_report_units(kind, float(x[k])) for x in (difference.value, difference.standard_uncertainty))
     name = difference.parameter.replace("_", " ") + (" shape" if difference.shape_only else "")
-    row = f"{name:<19}{value:10.4g}{'-' if np.isnan(u) else f'{u:.3g}':>10}{_place(difference, k):>10}   "
+    largest = (name, f"{value:.4g}", "-" if np.isnan(u) else f"{u:.3g}", _place(difference, k))
     probability = comparison.probability(difference)
     if worst is None or probability is None:
-        return f"{row}{'-':>10}{'-':>10}{'-':>13}  {REPORT_UNIT[kind]}"
+        return (*largest, "-", "-", "-", REPORT_UNIT[kind])
     mark = " significant" if comparison.is_significant(difference) else ""
-    normalised = float(difference.normalised[worst])
-    return f"{row}{normalised:10.3g}{_place(difference, worst):>10}{probability:13.3g}  {REPORT_UNIT[kind]}{mark}"
+    normalised = f"{float(difference.normalised[worst]):.3g}"
+    return (*largest, normalised, _place(difference, worst), f"{probability:.3g}", f"{REPORT_UNIT[kind]}{mark}")
 
 
 def _place(difference: Difference, k: int) -> str:
     return "-" if np.isnan(difference.position[k]) else f"{difference.position[k]:g}"
 
 
-def _rules(comparison: Comparison) -> Iterator[str]:
+def _rules(comparison: Comparison) -> Iterator[Block]:
     if comparison.count:
         marked = sum(map(comparison.is_significant, comparison.differences))
-        yield (
-            f"significant: {marked} of {len(comparison.differences)} parameters, where |B - A| is beyond "
-            f"{comparison.threshold:.3g} u for any of its values"
+        yield RowBlock(
+            "significant",
+            f"{marked} of {len(comparison.differences)} parameters, where |B - A| is beyond "
+            f"{comparison.threshold:.3g} u for any of its values",
         )
-        yield (
-            f"probability: that chance makes any of the {comparison.count} values differ so, at most (Bonferroni); "
-            f"significant up to {comparison.limit:g}"
+        yield RowBlock(
+            "probability",
+            f"that chance makes any of the {comparison.count} values differ so, at most (Bonferroni); significant up "
+            f"to {comparison.limit:g}",
         )
         if comparison.agreement is not None:
-            yield "u: that of the calibration; the error map is taken as exact"
+            yield RowBlock("u", "that of the calibration; the error map is taken as exact")
         else:
-            yield "u = sqrt(u_A^2 + u_B^2), as if A and B were independent: two evaluations of one run are not,"
-            yield "and then differ by less than u says"
+            yield NoteBlock(
+                "u = sqrt(u_A^2 + u_B^2), as if A and B were independent: two evaluations of one run are not,"
+            )
+            yield NoteBlock("and then differ by less than u says")
     else:
-        yield "significance: not known, because one of the two has no standard uncertainties"
+        yield RowBlock("significance", "not known, because one of the two has no standard uncertainties")
     for which in "AB":
         yield from _named(
-            f"note: {which} is interpolated at the nodes of the other one:",
+            f"note: {which} is interpolated at the nodes of the other one",
             [d.parameter for d in comparison.differences if d.interpolated == which],
         )
     shapes = [d.parameter for d in comparison.differences if d.shape_only]
     slopes = [name for name in shapes if not name.endswith("_reversal")]
-    yield from _named("note: shapes, both ends at 0, because a slope is not determined:", slopes)
+    yield from _named("note: shapes, both ends at 0, because a slope is not determined", slopes)
     if len(shapes) > len(slopes):
-        yield "note: shapes of reversal errors, 0 at the first position, because a constant is not determined"
-    yield from _named("only in A:", comparison.only_in_a)
-    yield from _named("only in B:", comparison.only_in_b)
-    for note in comparison.notes:
-        yield f"note: {note}"
+        yield RowBlock(
+            "note", "shapes of reversal errors, 0 at the first position, because a constant is not determined"
+        )
+    yield from _named("only in A", comparison.only_in_a)
+    yield from _named("only in B", comparison.only_in_b)
+    yield from (RowBlock("note", note) for note in comparison.notes)
 
 
-def _named(what: str, parameters: Sequence[str]) -> Iterator[str]:
+def _named(what: str, parameters: Sequence[str]) -> Iterator[RowBlock]:
     if parameters:
-        yield f"{what} {', '.join(parameters)}"
+        yield RowBlock(what, ", ".join(parameters))
 
 
 def comparison_csv(comparison: Comparison) -> str:

@@ -1,4 +1,4 @@
-"""What the commands tell about their results, as lines of text."""
+"""What is said of an evaluation, in blocks."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,17 +17,19 @@ from stepdiag._core import (
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.display import point_text
 from stepdiag.findings.faults import fault_rows
-from stepdiag.findings.meaning import NOISE_ALONE, fit_rows
-from stepdiag.findings.mistakes import FoundMistake, change_rows
-from stepdiag.findings.temperature import temperature_rows
+from stepdiag.findings.meaning import NOISE_ALONE, fit_words
+from stepdiag.findings.mistakes import FoundMistake
+from stepdiag.findings.temperature import temperature_text
 from stepdiag.findings.undetermined import combination_text
-from stepdiag.findings.unseen import unseen_rows
-from stepdiag.findings.verdict import verdict_rows
+from stepdiag.findings.unseen import ONE_AT_A_TIME
+from stepdiag.findings.verdict import verdict_words
 from stepdiag.mistakes.copies import passes_of
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
-from stepdiag.presentation.fault_control import control_rows
+from stepdiag.presentation.blocks import Block, NoteBlock, RowBlock, TableBlock
+from stepdiag.presentation.fault_control import control_blocks
+from stepdiag.presentation.fit import fit_blocks
 from stepdiag.presentation.prior_effects import cosine_rows, drift_rows, rounding_rows
-from stepdiag.presentation.setup_table import NOTHING_LEARNT, setup_rows
+from stepdiag.presentation.setup_table import NOTHING_LEARNT, setup_blocks
 from stepdiag.scenario.description import JudgedEvaluation, reduced_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -36,12 +38,12 @@ from stepdiag.units import HOUR, MICRO, MICROMETRE
 SIGNIFICANT: Final = 2.58  # times its standard uncertainty: one of a hundred that are 0
 
 
-def evaluation_report(
+def evaluation_blocks(
     result: JudgedEvaluation | Adjustment,
     measurement: Measurement,
     known: Known,
     mistakes: Sequence[FoundMistake] = (),
-) -> Iterator[str]:
+) -> Iterator[Block]:
     """The verdict of the fit, what to change if a mistake explains it, lost readings, largest standard uncertainties
     and what is not determined; of an adjustment also faults of the readings, and how head and mirror were set up."""
     if isinstance(result, JudgedEvaluation):
@@ -51,66 +53,72 @@ def evaluation_report(
 
 def _published(
     judged: JudgedEvaluation, measurement: Measurement, known: Known, mistakes: Sequence[FoundMistake]
-) -> Iterator[str]:
+) -> Iterator[Block]:
     calibration = judged.calibration
-    first, *rest = fit_rows(calibration)
-    yield first
     adjusted = "none" if judged.adjustment is None else judged.adjustment.verdict.fit
-    yield (
-        f"that is the worse of the method's own test ({judged.own}) and of the adjustment of the same readings "
-        f"({adjusted})"
+    yield from fit_blocks(fit_words(calibration), mistakes)
+    yield RowBlock(
+        "two verdicts",
+        f"the fit is the worse of the method's own test ({judged.own}) and of the adjustment of the same readings "
+        f"({adjusted})",
     )
-    yield from rest
-    yield from change_rows(mistakes)
     yield from _what_was_done(calibration, measurement, known)
-    yield from uncertainty_rows(calibration)
+    yield uncertainty_table(calibration)
     yield from budget_rows(calibration)
     yield from undetermined_rows(calibration)
-    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    yield RowBlock("reference", straightness_reference(calibration.chain, calibration.tool))
     yield unchecked_row(known)
     if known.keys.adjustment.model_fields_set:
-        yield f"note: [adjustment] is not used by the method {calibration.method}"
+        yield RowBlock("note", f"[adjustment] is not used by the method {calibration.method}")
 
 
 def _adjusted(
     adjustment: Adjustment, measurement: Measurement, known: Known, mistakes: Sequence[FoundMistake]
-) -> Iterator[str]:
+) -> Iterator[Block]:
     calibration = adjustment.calibration
-    yield from verdict_rows(adjustment)
-    yield from change_rows(mistakes)
-    yield from (f"note: {row}" for row in rounding_rows(adjustment.rounded))
+    yield from fit_blocks(verdict_words(adjustment), mistakes)
+    yield from (RowBlock("note", row) for row in rounding_rows(adjustment.rounded))
     yield from _what_was_done(calibration, measurement, known)
-    yield from fault_rows(adjustment.faults)
-    yield from uncertainty_rows(calibration)
+    yield from (RowBlock(*row) for row in fault_rows(adjustment.faults))
+    yield uncertainty_table(calibration)
     yield from budget_rows(calibration)
-    yield from reversal_rows(calibration)
-    rows = list(setup_rows(adjustment.setup, [*known.plan.lines, *known.plan.scale_lines]))
-    if rows:
-        yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
-        yield from rows
-    yield from expansion_rows(adjustment.expansion)
-    yield from machine_drift_rows(adjustment.machine_drift, known)
+    yield from reversal_table(calibration)
+    yield from setup_blocks(
+        adjustment.setup,
+        [*known.plan.lines, *known.plan.scale_lines],
+        "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5",
+    )
+    yield from map(NoteBlock, expansion_rows(adjustment.expansion))
+    yield from map(NoteBlock, machine_drift_rows(adjustment.machine_drift, known))
     yield from undetermined_rows(calibration, map(combination_text, adjustment.combinations))
     yield from smoothness_rows(adjustment.smoothness)
     # Caveats come last: the first screen is for the result.
     yield from unseen_rows(calibration)
-    yield from cosine_rows(measurement, known)
-    yield from drift_rows(measurement, known)
-    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    yield from map(NoteBlock, [*cosine_rows(measurement, known), *drift_rows(measurement, known)])
+    yield RowBlock("reference", straightness_reference(calibration.chain, calibration.tool))
     yield unchecked_row(known)
     if adjustment.reliability:
-        yield from control_rows(adjustment.reliability)
+        yield from control_blocks(adjustment.reliability)
 
 
-def _what_was_done(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:
-    yield f"method: {calibration.method}, chain {calibration.chain.name}"
-    yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
-    yield from temperature_rows(calibration)
-    yield from calibration.conditions
+def _what_was_done(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[Block]:
+    yield RowBlock("method", f"{calibration.method}, chain {calibration.chain.name}")
+    yield RowBlock("readings", f"{len(measurement)} points on {len(set(measurement.line))} lines")
+    yield RowBlock("temperature", temperature_text(calibration))
+    yield from map(NoteBlock, calibration.conditions)
     yield from air_rows(measurement, known)
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:
-        yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
+        yield RowBlock(
+            "lost", f"{incomplete} rows without a complete reading, {missing} points of the plan without a row"
+        )
+
+
+def unseen_rows(calibration: Calibration) -> Iterator[Block]:
+    """How large faults of readings may be in a calibration unseen."""
+    yield from (RowBlock("unseen", sentence) for sentence in calibration.unseen_faults)
+    if calibration.unseen_faults:
+        yield NoteBlock(ONE_AT_A_TIME, indented=True)
 
 
 def expansion_rows(estimates: Iterable[ExpansionEstimate], *, values: bool = True) -> Iterator[str]:
@@ -142,7 +150,7 @@ def machine_drift_rows(estimates: Iterable[DriftEstimate], known: Known, *, valu
         yield f"drift of the functional point along {'XYZ'[estimate.axis]}: taken as 0 ± {prior:.2g} {unit}, {found}"
 
 
-def air_rows(measurement: Measurement, known: Known) -> Iterator[str]:
+def air_rows(measurement: Measurement, known: Known) -> Iterator[Block]:
     """The largest correction for the air, where evaluations make it."""
     if known.assumed_air is None:
         return
@@ -153,64 +161,67 @@ def air_rows(measurement: Measurement, known: Known) -> Iterator[str]:
             read = change[rows][np.isfinite(change[rows])]
             if read.size:  # a constant of a line is none of its length
                 largest = max(largest, float(np.ptp(read)))
-    yield (
-        "air: the instrument counted with a constant index; distances were corrected by up to "
-        f"{largest * 1e3:.3g} µm along a line"
+    yield RowBlock(
+        "air",
+        "the instrument counted with a constant index; distances were corrected by up to "
+        f"{largest * 1e3:.3g} µm along a line",
     )
 
 
-def undetermined_rows(calibration: Calibration, combinations: Iterable[str] = ()) -> Iterator[str]:
+def undetermined_rows(calibration: Calibration, combinations: Iterable[str] = ()) -> Iterator[Block]:
     """What is not determined, and what is known of it all the same."""
-    for sentence in calibration.undetermined:
-        yield f"undetermined: {sentence}"
-    for combination in combinations:
-        yield f"known: {combination}"
+    yield from (RowBlock("undetermined", sentence) for sentence in calibration.undetermined)
+    yield from (RowBlock("known", combination) for combination in combinations)
     if calibration.undetermined_slopes:
-        yield "note: a function of undetermined slope is given by its shape, with both ends at 0"
+        yield RowBlock("note", "a function of undetermined slope is given by its shape, with both ends at 0")
 
 
-def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:
+def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[Block]:
     """Which functions were smoothed, and how much."""
     if deviations:
         said = (
             f"{name} {in_report_units(kind_of(name), d):.3g} {REPORT_UNIT[kind_of(name)]}"
             for name, d in deviations.items()
         )
-        yield f"smoothed, standard deviation of second differences: {', '.join(said)}"
+        yield RowBlock("smoothed, standard deviation of second differences", ", ".join(said))
 
 
-def reversal_rows(calibration: Calibration) -> Iterator[str]:
+def reversal_table(calibration: Calibration) -> Iterator[TableBlock]:
     """The largest reversal error of each kind."""
     largest: dict[Kind, tuple[float, float, str]] = {}
     for name, (position, value, uncertainty) in calibration.reversal.items():
         kind, worst = kind_of(name), int(np.argmax(np.abs(value)))
         if abs(value[worst]) >= abs(largest.get(kind, (0.0, 0.0, ""))[0]):
             largest[kind] = float(value[worst]), float(uncertainty[worst]), f"{name} at {position[worst]:g} mm"
-    if largest:
-        yield "largest reversal errors, + less - direction of approach:"
+    rows = []
     for kind in KINDS:
         if kind in largest:
             error, uncertainty_of_it, where = largest[kind]
             unit, u = REPORT_UNIT[kind], "not known"  # as of a calibration that was read from CSV
             if not math.isnan(uncertainty_of_it):
                 u = f"{in_report_units(kind, uncertainty_of_it):.2g} {unit}"
-            yield f"  {kind:<13}{in_report_units(kind, error):9.3g} {unit:<5} ({where}; standard uncertainty {u})"
+            rows.append((kind, f"{in_report_units(kind, error):.3g}", unit, f"({where}; standard uncertainty {u})"))
+    if rows:
+        yield TableBlock(tuple(rows), title="largest reversal errors, + less - direction of approach", left=(0, 2, 3))
 
 
-def budget_rows(calibration: Calibration) -> Iterator[str]:
-    """One line, where it is known."""
+def budget_rows(calibration: Calibration) -> Iterator[Block]:
+    """One row, where it is known."""
     if calibration.budget:
-        yield f"budget: {calibration.budget}"
+        yield RowBlock("budget", calibration.budget)
 
 
-def uncertainty_rows(calibration: Calibration) -> Iterator[str]:
+def uncertainty_table(calibration: Calibration) -> TableBlock:
     """The largest standard uncertainty of each kind, and where it is."""
-    yield f"largest standard uncertainties{', of noise alone' if calibration.method in NOISE_ALONE else ''}:"
-    for kind, (uncertainty, where) in largest_uncertainties(calibration).items():
-        yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {REPORT_UNIT[kind]:<5} ({where})"
+    rows = (
+        (kind, f"{in_report_units(kind, uncertainty):.3g}", REPORT_UNIT[kind], f"({where})")
+        for kind, (uncertainty, where) in largest_uncertainties(calibration).items()
+    )
+    alone = ", of noise alone" if calibration.method in NOISE_ALONE else ""
+    return TableBlock(tuple(rows), title=f"largest standard uncertainties{alone}", left=(0, 2, 3))
 
 
-def unchecked_row(known: Known) -> str:
+def unchecked_row(known: Known) -> RowBlock:
     """What no reading shows, with the values that were used, so that a person can check them."""
     heads = list(known.heads.values())
     standoffs = ", ".join(dict.fromkeys(f"{head.standoff:g}" for head in heads))
@@ -219,8 +230,9 @@ def unchecked_row(known: Known) -> str:
     if known.expansion is not None:
         numbers = dict.fromkeys(f"{1e6 * c:g}" for c in known.expansion.expansion.coefficient)
         scales = f", expansion of the scales {', '.join(numbers)} µm/(m·K)"
-    return (
-        f"check by hand, as no reading shows it: place of b in the chain {known.chain.name}, tool offset "
-        f"{point_text(known.tool)}, standoff {standoffs} mm, wavelength {wavelengths} nm{scales}, and the index of air "
-        "and the temperature that all distances were reduced with"
+    return RowBlock(
+        "check by hand, as no reading shows it",
+        f"place of b in the chain {known.chain.name}, tool offset {point_text(known.tool)}, standoff {standoffs} mm, "
+        f"wavelength {wavelengths} nm{scales}, and the index of air and the temperature that all distances were "
+        "reduced with",
     )

@@ -1,4 +1,4 @@
-"""Which faults of the readings a plan or a run controls, as lines of text."""
+"""Which faults of the readings a plan or a run controls, in blocks."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from stepdiag._core import FaultControl
 from stepdiag.findings.unseen import FAULT_NAMES, FAULT_UNITS
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
+from stepdiag.presentation.blocks import Block, NoteBlock, TableBlock
 from stepdiag.units import report_value
 
 if TYPE_CHECKING:
@@ -15,25 +16,32 @@ if TYPE_CHECKING:
 ROUNDING: Final = 1e-6  # µm or µrad for each µm or µrad of a fault
 
 
-def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
-    """Each kind of fault: from which size on one is found, what it may do up to there, and whether it is told from
-    others."""
-    yield "faults that the readings control, one at a time: found (99 %) from which size on, the largest effect of a"
-    yield "fault just not found, and the size from which it is distinguished from all others:"
-    yield f"  {'':<18}{'found from':>14}" + "".join(f"{kind:>14}" for kind in KINDS) + "  distinguished"
-    yield f"  {'':<18}{'':>14}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
+def control_blocks(controls: Sequence[FaultControl]) -> Iterator[Block]:
+    """Each kind of fault: from which size on one is found, what it may do up to there, and whether it is distinguished
+    from others."""
+    rows = [("", "", *(REPORT_UNIT[kind] for kind in KINDS), "")]
     for c in controls:
-        cells = "".join(f"{_hidden(c, kind):>14}" for kind in KINDS)
-        yield f"  {name(c):<18}{_size(c, c.found_from):>14}{cells}  {distinguished(c)}"
+        cells = (_hidden(c, kind) for kind in KINDS)
+        rows.append((name(c), _size(c, c.found_from), *cells, distinguished(c)))
+    yield NoteBlock(
+        "faults that the readings control, one at a time: found (99 %) from which size on, the largest effect"
+    )
+    yield TableBlock(
+        tuple(rows),
+        ("", "found from", *KINDS, "distinguished"),
+        "of a fault just not found, and the size from which it is distinguished from all others",
+        left=(0, 2 + len(KINDS)),
+    )
     for c in controls:
         if c.uncontrolled:
-            yield f"  {name(c)}: {c.uncontrolled} of {c.count + c.uncontrolled} that no other reading controls"
+            count = f"{c.uncontrolled} of {c.count + c.uncontrolled}"
+            yield NoteBlock(f"{name(c)}: {count} that no other reading controls", indented=True)
     for c in controls:
         if c.twins:
-            yield f"  {name(c)} not distinguished from a twin: by {_unit(c)} of it {_shared(c)}"
+            yield NoteBlock(f"{name(c)} not distinguished from a twin: by {_unit(c)} of it {_shared(c)}", indented=True)
 
 
-def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[str]:
+def extension_blocks(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[Block]:
     """What would distinguish or control what the plan does not; nothing where it does."""
     from stepdiag.planning.fault_control import tells_all  # reports of evaluations need none of that room
 
@@ -41,10 +49,11 @@ def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") ->
         return
     for extension in tried:
         if extension.trouble:
-            yield f"  {extension.name}: {extension.trouble}"
+            yield NoteBlock(f"{extension.name}: {extension.trouble}", indented=True)
             continue
         said = "; ".join(f"{name(c)} {distinguished(c)}" for c in extension.controls)
-        yield f"  {extension.name} ({extension.minutes:+.1f} minutes), distinguished: {said}"
+        minutes = f"{extension.minutes:+.1f} minutes"
+        yield NoteBlock(f"{extension.name} ({minutes}), distinguished: {said}", indented=True)
 
 
 def name(control: FaultControl) -> str:

@@ -1,4 +1,4 @@
-"""Figures of ISO 230-2 and ISO 230-6 as text: of repeated readings, and predicted from a calibration."""
+"""Figures of ISO 230-2 and ISO 230-6 in blocks: of repeated readings, and predicted from a calibration."""
 
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.findings.meaning import fit_rows
+from stepdiag.findings.meaning import fit_words
 from stepdiag.positions.evaluation import CYCLES_OF_THE_STANDARD, MeasuredPositions
 from stepdiag.positions.figures import FIGURES, PositionFigure, symbol
 from stepdiag.positions.prediction import PredictedPositions
-from stepdiag.presentation.text_columns import text_columns
+from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock
+from stepdiag.presentation.fit import fit_blocks
 from stepdiag.units import report_value
 
 _DIRECTIONS = {"+": "↑", "-": "↓"}
@@ -26,38 +27,31 @@ def measured_warnings(result: MeasuredPositions) -> Iterator[str]:
         yield f"{fewest} readings of a target, where the standard takes {CYCLES_OF_THE_STANDARD} cycles"
 
 
-def measured_report(result: MeasuredPositions) -> Iterator[str]:
+def measured_blocks(result: MeasuredPositions) -> Iterator[Block]:
     """What was read, what is short of the standard, the figures, and the targets one by one."""
     readings = result.readings
-    for warning in measured_warnings(result):
-        yield f"incomplete: {warning}"
+    yield from (RowBlock("incomplete", warning) for warning in measured_warnings(result))
     if readings.line:
-        yield f"line: {readings.line}"
+        yield RowBlock("line", readings.line)
     arrows = " and ".join(_DIRECTIONS[direction] for direction in readings.directions)
-    yield (
+    yield NoteBlock(
         f"{len(readings.targets)} targets from {readings.targets[0]:g} to {readings.targets[-1]:g} mm, "
         f"{len(readings.cycles)} cycles, {arrows}, {len(readings.deviations)} readings, {readings.lost} lost"
     )
-    yield ""
-    yield from text_columns(
-        [
-            ("", "µm", "u, µm", "at mm", ""),
-            *(
-                (symbol(name), _micrometres(figure.value), _u(figure), _places(figure), FIGURES[name])
-                for name, figure in result.figures.items()
-            ),
-        ],
-        left=(0, 4),
+    yield HeadingBlock("figures")
+    rows = (
+        (symbol(name), _micrometres(figure.value), _u(figure), _places(figure), FIGURES[name])
+        for name, figure in result.figures.items()
     )
+    yield TableBlock(tuple(rows), ("", "µm", "u, µm", "at mm", ""), left=(0, 4))
     if len(readings.directions) == 1:
-        yield f"readings of {arrows} alone: no reversal error, no bidirectional figures"
-    yield "u: from the scatter of the readings alone, cycles taken as independent; instrument, alignment and"
-    yield "temperature are not in it"
-    yield ""
-    yield from text_columns(
-        [("target", "mean ↑", "s ↑", "n ↑", "mean ↓", "s ↓", "n ↓", "B", "R"), *_targets(result)], ()
-    )
-    yield "in mm and µm; s: sample standard deviation of n readings"
+        yield NoteBlock(f"readings of {arrows} alone: no reversal error, no bidirectional figures")
+    yield NoteBlock("u: from the scatter of the readings alone, cycles taken as independent; instrument, alignment and")
+    yield NoteBlock("temperature are not in it")
+    yield HeadingBlock("targets")
+    columns = ("target", "mean ↑", "s ↑", "n ↑", "mean ↓", "s ↓", "n ↓", "B", "R")
+    yield TableBlock(tuple(_targets(result)), columns, left=())
+    yield NoteBlock("in mm and µm; s: sample standard deviation of n readings")
 
 
 def _targets(result: MeasuredPositions) -> Iterator[tuple[str, ...]]:
@@ -73,12 +67,11 @@ def _targets(result: MeasuredPositions) -> Iterator[tuple[str, ...]]:
         yield (*cells, *(_micrometres(own.get(target)) for own in (result.reversal, result.repeatability)))
 
 
-def predicted_report(calibration: Calibration, lines: Mapping[str, PredictedPositions]) -> Iterator[str]:
+def predicted_blocks(calibration: Calibration, lines: Mapping[str, PredictedPositions]) -> Iterator[Block]:
     """Verdict of the fit, then the figures of one line in full, or a row for each of several lines."""
-    yield from fit_rows(calibration)
+    yield from fit_blocks(fit_words(calibration))
     first = next(iter(lines.values()))
-    yield f"tool offset {_point(first.tool)} mm; systematic part alone: no scatter of positions is in it"
-    yield ""
+    yield NoteBlock(f"tool offset {_point(first.tool)} mm; systematic part alone: no scatter of positions is in it")
     if len(lines) == 1:
         yield from _one_line(*next(iter(lines.items())))
     else:
@@ -89,33 +82,36 @@ def predicted_report(calibration: Calibration, lines: Mapping[str, PredictedPosi
         yield from _wrapped(reason if len(of) == len(lines) else f"{', '.join(of)}: {reason}")
     figures = [figure for line in lines.values() for figure in line.figures.items()]
     if any(figure.interval is not None and name == "E_up" for name, figure in figures):
-        yield "interval of E↑: 95 %, from the covariance of the calibration"
+        yield RowBlock("interval of E↑", "95 %, from the covariance of the calibration")
     if len(lines) == 1 and any(figure.interval is not None and name == "B" for name, figure in figures):
-        yield "interval of B: 95 %, from uncertainties of reversal errors; functions taken as independent"
-    yield "errors between the nodes of the calibration are in no interval"
+        yield RowBlock("interval of B", "95 %, from uncertainties of reversal errors; functions taken as independent")
+    yield NoteBlock("errors between the nodes of the calibration are in no interval")
 
 
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, 100, subsequent_indent="  ")
+def _wrapped(text: str) -> Iterator[NoteBlock]:
+    yield from map(NoteBlock, textwrap.wrap(text, 100, subsequent_indent="  "))
 
 
-def _one_line(name: str, line: PredictedPositions) -> Iterator[str]:
-    yield f"{name}: {_ends(line)}, {len(line.target)} targets"
-    rows = [("", "µm", "95 %", "at mm", "")]
-    for figure, value in line.figures.items():
-        rows.append((symbol(figure), _micrometres(value.value), _interval(value), _places(value), FIGURES[figure]))
-    yield from text_columns(rows, left=(0, 4))
+def _one_line(name: str, line: PredictedPositions) -> Iterator[Block]:
+    yield HeadingBlock(f"{name}: {_ends(line)}, {len(line.target)} targets")
+    rows = [
+        (symbol(figure), _micrometres(value.value), _interval(value), _places(value), FIGURES[figure])
+        for figure, value in line.figures.items()
+    ]
+    yield TableBlock(tuple(rows), ("", "µm", "95 %", "at mm", ""), left=(0, 4))
 
 
-def _several_lines(lines: Mapping[str, PredictedPositions]) -> Iterator[str]:
+def _several_lines(lines: Mapping[str, PredictedPositions]) -> Iterator[Block]:
     names = ("E_up", "E_down", "E", "M", "B")
     shown = [name for name in names if name == "E_up" or any(name in line.figures for line in lines.values())]
-    rows = [("µm", "from", "to", "E↑", "95 %", *(symbol(name) for name in shown[1:]))]
+    rows = []
     for name, line in lines.items():
         cells = [_micrometres(line.figures[figure].value) if figure in line.figures else "-" for figure in shown]
         interval = _interval(line.figures["E_up"]) if "E_up" in line.figures else "-"
         rows.append((name, _point(line.start), _point(line.end), cells[0], interval, *cells[1:]))
-    yield from text_columns(rows, left=(0, 1, 2))
+    yield HeadingBlock("lines")
+    columns = ("µm", "from", "to", "E↑", "95 %", *(symbol(name) for name in shown[1:]))
+    yield TableBlock(tuple(rows), columns, left=(0, 1, 2))
 
 
 def _ends(line: PredictedPositions) -> str:

@@ -9,8 +9,10 @@ import numpy as np
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement, check_points
 from stepdiag.evaluation.judge import judge
 from stepdiag.findings.mistakes import FoundMistake, change_rows, mistake_text
-from stepdiag.findings.verdict import verdict_rows
+from stepdiag.findings.verdict import verdict_words
 from stepdiag.io.data_files import read_measurement
+from stepdiag.presentation.blocks import text_of
+from stepdiag.presentation.fit import fit_blocks
 from stepdiag.scenario.description import read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -56,7 +58,7 @@ def _adjusted(known: Known, run: Measurement) -> FoundTogether:
 def _said(known: Known, run: Measurement, adjustment: Adjustment, mistakes: Sequence[FoundMistake]) -> Iterator[str]:
     incomplete, missing = lost_readings(run, known.plan, known.signals)
     yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
-    yield from verdict_rows(adjustment)
+    yield from text_of(fit_blocks(verdict_words(adjustment)))
     if mistakes and adjustment.verdict.fit == "accepted":  # by its faults, which were corrected
         yield f"note: {mistake_text(mistakes)}"
     yield from change_rows(mistakes)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Final, Protocol
 
-from stepdiag.presentation.text_columns import text_columns
+from stepdiag.presentation.blocks import Block, NoteBlock, TableBlock
 from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name, report_unit
 
 # Above this share of its prior uncertainty an unknown is as good as unread.
@@ -30,12 +30,17 @@ class SetupFound(Protocol):
     def prior(self) -> float: ...
 
 
-def setup_rows(estimates: Sequence[SetupFound], lines: Sequence[str], *, values: bool = True) -> Iterator[str]:
-    """`setup_table` as lines of text."""
+def setup_blocks(
+    estimates: Sequence[SetupFound], lines: Sequence[str], title: str, *, values: bool = True
+) -> Iterator[Block]:
+    """`setup_table` as blocks; nothing where there is nothing to show."""
     rows, notes = setup_table(estimates, lines, values=values)
     if rows:
-        yield from text_columns(rows)
-    yield from (f"  {note}" for note in notes)
+        heading, *others = map(tuple, rows)
+        yield TableBlock(tuple(others), heading, title)
+    elif notes:
+        yield NoteBlock(f"{title}:")
+    yield from (NoteBlock(note, indented=True) for note in notes)
 
 
 def setup_table(

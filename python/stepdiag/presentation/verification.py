@@ -1,4 +1,4 @@
-"""The reports of `stepdiag verify` and `stepdiag recheck`."""
+"""What `stepdiag verify` and `stepdiag recheck` say, in blocks."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from stepdiag._core import ChangeCombination, ChangeTerm, FaultClass, Measurement, Recheck, Verification
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.findings.faults import fault_rows
-from stepdiag.presentation.text_columns import text_columns
+from stepdiag.presentation.blocks import Block, NoteBlock, RowBlock, TableBlock, VerdictBlock
 from stepdiag.rechecking.recheck import CHANGE_UNITS, Judged
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
@@ -19,34 +19,35 @@ def agrees(verification: Verification, alpha: float) -> bool:
     return verification.probability >= alpha
 
 
-def verification_report(verification: Verification, measurement: Measurement, alpha: float) -> Iterator[str]:
+def verification_blocks(verification: Verification, measurement: Measurement, alpha: float) -> Iterator[Block]:
     """The verdict first, then E_n by line, then the largest deviation of a reading."""
-    p = verification.probability
     tested = (
         f"chi-square {verification.chi_square:.1f} with {verification.degrees_of_freedom} degrees of freedom; "
-        f"by chance it is larger in {_percent(p)} of cases"
+        f"by chance it is larger in {_percent(verification.probability)} of cases"
     )
     rest = _rest(verification.left_out)
     if agrees(verification, alpha):
-        yield f"{rest} agree with the calibration: {tested}"
+        yield VerdictBlock("", "agrees", f"{rest} agree with the calibration", tested)
     else:
-        yield f"{rest} do not agree with the calibration: {tested} (limit {100.0 * alpha:g} %)"
-    yield from fault_rows(verification.left_out)
-    rows = [("line", "run", "direction", "deviation", "U", "E_n")]
+        tested += f" (limit {100.0 * alpha:g} %)"
+        yield VerdictBlock("", "does not agree", f"{rest} do not agree with the calibration", tested)
+    yield from (RowBlock(*row) for row in fault_rows(verification.left_out))
+    rows = []
     for line in verification.lines:
         deviation, expanded = line.deviation / MICROMETRE, COVERAGE * line.standard_uncertainty / MICROMETRE
         numbers = (f"{deviation:+.2f}", f"{expanded:.2f}", f"{line.normalised:+.2f}")
         rows.append((line.line, str(line.run), line.direction, *numbers))
-    if len(rows) > 1:
-        yield "from end to end of each line, read minus predicted (µm), U its expanded uncertainty (k = 2), E_n by U:"
-        yield from text_columns(rows, left=(0, 2))
+    if rows:
+        title = "from end to end of each line, read minus predicted (µm), U its expanded uncertainty (k = 2), E_n by U"
+        yield TableBlock(tuple(rows), ("line", "run", "direction", "deviation", "U", "E_n"), title, left=(0, 2))
         beyond = sum(abs(line.normalised) > 1.0 for line in verification.lines)
-        yield f"  beyond 1: {beyond} of {len(verification.lines)}; 4.6 % are expected by chance"
+        text = f"beyond 1: {beyond} of {len(verification.lines)}; 4.6 % are expected by chance"
+        yield NoteBlock(text, indented=True)
     if agrees(verification, alpha):
-        yield f"largest deviation of a reading: {next(_worst(verification, measurement))}"
+        yield RowBlock("largest deviation of a reading", next(_worst(verification, measurement)))
     else:
-        yield "largest deviations of readings:"
-        yield from (f"  {text}" for text in _worst(verification, measurement))
+        yield NoteBlock("largest deviations of readings:")
+        yield from (NoteBlock(text, indented=True) for text in _worst(verification, measurement))
 
 
 def _percent(p: float) -> str:
@@ -84,13 +85,13 @@ def _place(measurement: Measurement, row: int) -> str:
     return f"line {measurement.line[row]}, run {measurement.run[row]}, point {measurement.point[row]}"
 
 
-TOLD = 0.9  # of a change that readings tell alone
-UNTOLD = 0.1
+ALONE = 0.9  # of a change that the readings determine by itself
+HARDLY = 0.1
 SHARE = 0.2  # of a sum, below which a term is not named
-MOSTLY = 0.5  # of a sum, that has to be of changes told together
+MOSTLY = 0.5  # of a sum, that has to be of changes determined together
 
 
-def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeErrors) -> Iterator[str]:
+def recheck_blocks(judged: Judged, measurement: Measurement, volume: VolumeErrors) -> Iterator[Block]:
     """The verdict first; then what is known of each change, what may be hidden, and the volume's error."""
     found = judged.recheck
     tested = (
@@ -99,37 +100,25 @@ def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeError
         f"(limit {100.0 * judged.alpha:g} %)"
     )
     without = ", by the readings that are not left out" if found.left_out else ""
-    match judged.verdict:
-        case "unexplained":
-            yield (
-                f"the machine has changed, unexplained: {_rest(found.left_out)} go neither with the calibration nor "
-                "with a change of low order; it has changed otherwise, or readings are wrong "
-                f"(chi-square {found.fit_chi_square:.1f} with {found.fit_degrees_of_freedom} degrees of freedom, by "
-                f"chance larger in {_percent(found.fit_probability)} of cases, limit {100.0 * judged.alpha:g} %)"
-            )
-            yield from fault_rows(found.left_out)
-            yield "readings that are farthest from the machine with the best change of low order:"
-            yield from (f"  {text}" for text in _misfits(found, measurement))
-            yield f"change of low order: {tested}"
-        case "changed":
-            yield f"the machine has changed{without}: {tested}"
-            yield from fault_rows(found.left_out)
-        case "unchanged":
-            yield f"no change of the machine is seen{without}: {tested}"
-            yield from fault_rows(found.left_out)
-    told = [term for term in found.terms if term.determined >= TOLD]
-    if told:
-        yield "changes that the readings determine one by one, U their expanded uncertainty (k = 2):"
-        yield from text_columns([("parameter", "change", "", "U", ""), *map(_change_row, told)], left=(0, 2, 4))
-    together = [term for term in found.terms if UNTOLD < term.determined < TOLD]
-    if together:
-        yield f"determined only together: {', '.join(f'{term.parameter} ({term.kind})' for term in together)}"
-        sums = [text for one in found.combinations if (text := _sum_text(one, found.terms, together))]
-        yield from (f"  {text}" for text in sums)
-    untold = [f"{term.parameter} ({term.kind})" for term in found.terms if term.determined <= UNTOLD]
-    if untold:
-        yield f"not determined: {', '.join(untold)}"
-    yield (
+    headline, why = {
+        "unexplained": (
+            "the machine has changed, unexplained",
+            f"{_rest(found.left_out)} go neither with the calibration nor with a change of low order; it has changed "
+            f"otherwise, or readings are wrong (chi-square {found.fit_chi_square:.1f} with "
+            f"{found.fit_degrees_of_freedom} degrees of freedom, by chance larger in {_percent(found.fit_probability)} "
+            f"of cases, limit {100.0 * judged.alpha:g} %)",
+        ),
+        "changed": (f"the machine has changed{without}", tested),
+        "unchanged": (f"no change of the machine is seen{without}", tested),
+    }[judged.verdict]
+    yield VerdictBlock("", judged.verdict, headline, why)
+    yield from (RowBlock(*row) for row in fault_rows(found.left_out))
+    if judged.verdict == "unexplained":
+        yield NoteBlock("readings that are farthest from the machine with the best change of low order:")
+        yield from (NoteBlock(text, indented=True) for text in _misfits(found, measurement))
+        yield RowBlock("change of low order", tested)
+    yield from _change_blocks(found)
+    yield NoteBlock(
         f"changes that are not seen may move the tool by {judged.hidden / MICROMETRE:.1f} µm somewhere in the volume "
         "(k = 2, with the priors of [change])"
     )
@@ -137,7 +126,24 @@ def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeError
     if volume.largest_interval is not None:
         low, high = (end / MICROMETRE for end in volume.largest_interval)
         interval = f", 95 % interval {low:.1f} to {high:.1f} µm"
-    yield f"largest error in the volume with the change: {volume.largest / MICROMETRE:.1f} µm{interval}"
+    yield RowBlock("largest error in the volume with the change", f"{volume.largest / MICROMETRE:.1f} µm{interval}")
+
+
+def _change_blocks(found: Recheck) -> Iterator[Block]:
+    """What the readings determine of each change: by itself, only together, or not."""
+    alone = [term for term in found.terms if term.determined >= ALONE]
+    if alone:
+        title = "changes that the readings determine one by one, U their expanded uncertainty (k = 2)"
+        columns = ("parameter", "change", "", "U", "")
+        yield TableBlock(tuple(map(_change_row, alone)), columns, title, left=(0, 2, 4))
+    together = [term for term in found.terms if HARDLY < term.determined < ALONE]
+    if together:
+        yield RowBlock("determined only together", ", ".join(f"{term.parameter} ({term.kind})" for term in together))
+        sums = [text for one in found.combinations if (text := _sum_text(one, found.terms, together))]
+        yield from (NoteBlock(text, indented=True) for text in sums)
+    others = [f"{term.parameter} ({term.kind})" for term in found.terms if term.determined <= HARDLY]
+    if others:
+        yield RowBlock("not determined", ", ".join(others))
 
 
 def _misfits(found: Recheck, measurement: Measurement) -> Iterator[str]:

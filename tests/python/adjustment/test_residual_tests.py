@@ -9,7 +9,7 @@ import pytest
 from usual import CHAIN, DIAGONALS, SCALE_LINES, VOLUME
 
 import stepdiag as sd
-from stepdiag.findings.verdict import verdict_rows
+from stepdiag.findings.verdict import verdict_words
 
 STATED = {"distance": 0.1e-3, "alpha": 1e-6, "beta": 1e-6}
 MACHINE = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=7))
@@ -56,9 +56,9 @@ def test_larger_noise_is_measured_by_channel_and_said() -> None:
     # The run is adjusted with that noise: to 1 % of a factor, where the iteration ends, so 2 % of its square, and to
     # what 16 draws know of the redundancies.
     assert found.variance_factor == pytest.approx(1.0, abs=0.05)
-    first, *_, note = verdict_rows(found)
-    assert first.startswith("fit: doubtful: noise: alpha scatters 1.4")
-    assert "state it in [uncertainty]" in note
+    words = verdict_words(found)
+    assert words.said.startswith("doubtful: noise: alpha scatters 1.4")
+    assert "state it in [uncertainty]" in words.notes[-1][1]
 
 
 def test_smaller_noise_is_measured_and_said() -> None:

@@ -8,8 +8,9 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.findings.unseen import unseen_rows
 from stepdiag.parameters import KINDS, kind_of
+from stepdiag.presentation.blocks import text_of
+from stepdiag.presentation.evaluation import unseen_rows
 
 SOUND = SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
 PLANS = {
@@ -77,9 +78,9 @@ def test_files_and_reports_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[
         said = capsys.readouterr().out
         read = sd.read_calibration(tmp_path / name)
         assert len(read.unseen_faults) == 2  # distances and tilts
-        assert "\n".join(unseen_rows(read)) in said
+        assert "\n".join(text_of(unseen_rows(read))) in said
         assert main(["report", str(tmp_path / name)]) == 0
-        assert "\n".join(unseen_rows(read)) in capsys.readouterr().out
+        assert "\n".join(text_of(unseen_rows(read))) in capsys.readouterr().out
     assert "# unseen_faults=a wrong distance below " in (tmp_path / "calibration.csv").read_text() or (
         "# unseen_faults=a slip of distances below " in (tmp_path / "calibration.csv").read_text()
     )

@@ -11,7 +11,8 @@ from stepdiag.cli import main
 from stepdiag.parameters import KINDS, kind_of
 from stepdiag.planning.fault_control import extensions, tells_all
 from stepdiag.planning.observation import not_measured, observe
-from stepdiag.presentation.fault_control import control_rows, extension_rows
+from stepdiag.presentation.blocks import text_of
+from stepdiag.presentation.fault_control import control_blocks, extension_blocks
 from stepdiag.scenario.description import Scenario, adjust_scenario, parse_scenario
 from stepdiag.scenario.truth import Truth
 
@@ -137,7 +138,7 @@ def test_fault_of_a_reading_that_nothing_controls_may_do_anything() -> None:
     # Three body diagonals and three scale lines: nothing is measured more often than there are unknowns of it.
     known = parse_scenario(SMALL.replace(', "nnp"]', "]")).known
     own = {(c.kind, c.channel): c for c in observe(known)[1].reliability}
-    rows = "\n".join(control_rows([*own.values()]))
+    rows = "\n".join(text_of(control_blocks([*own.values()])))
     assert own["reading", "distance"].uncontrolled > 0
     assert own["reading", "distance"].hidden["positioning"] == np.inf
     assert "that no other reading controls" in rows
@@ -190,4 +191,4 @@ def test_evaluate_says_on_demand_what_would_have_been_found(scenario: str, capsy
 def test_plan_that_tells_all_needs_nothing_more() -> None:
     known = parse_scenario(FACES.replace("steps = 2", "steps = 10\nrepeats = 2")).known
     own = observe(known)[1].reliability
-    assert not [row for row in extension_rows(own, extensions(known)) if tells_all(own)]
+    assert not [row for row in extension_blocks(own, list(extensions(known))) if tells_all(own)]

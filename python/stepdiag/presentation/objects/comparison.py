@@ -9,8 +9,10 @@ from typing_extensions import TypedDict
 from stepdiag._core import Calibration
 from stepdiag.calibration import truth, volume_change
 from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.presentation.blocks import data_of
+from stepdiag.presentation.comparison import comparison_blocks
 from stepdiag.presentation.objects.calibration import Fit, Temperature, fit_of, temperature_of, value_unit
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.quantity import Quantities, Quantity, number, quantities, quantity, with_interval
 
 
@@ -91,7 +93,7 @@ class AgreementWithMap(TypedDict):
     """Of a larger chi-square, if the uncertainties are right."""
 
 
-class ComparisonObject(Object):
+class ComparisonObject(Reported):
     """Result of `stepdiag compare`."""
 
     a: ComparedCalibration
@@ -123,6 +125,7 @@ def comparison_object(
     significant = filter(comparison.is_significant, comparison.differences)
     return {
         **first_keys("comparison", warnings),
+        "report": data_of(comparison_blocks(comparison, change, str(files[0]), str(files[1]))),
         "a": _compared(comparison.a, files[0]),
         "b": _compared(comparison.b, files[1]),
         "chain": comparison.a.chain.name,

@@ -21,6 +21,8 @@ from stepdiag._core import (
 from stepdiag.findings.faults import fault_text
 from stepdiag.findings.mistakes import FoundMistake
 from stepdiag.findings.undetermined import combination_text
+from stepdiag.presentation.blocks import data_of
+from stepdiag.presentation.evaluation import evaluation_blocks
 from stepdiag.presentation.objects.calibration import (
     CalibrationTables,
     Fit,
@@ -33,7 +35,7 @@ from stepdiag.presentation.objects.calibration import (
     value_unit,
 )
 from stepdiag.presentation.objects.conditions import PositioningParts, UsedConditions, budget_object, conditions_object
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.presentation.quantity import BY_KEY, Quantity, Unit, number, quantity
 from stepdiag.scenario.description import JudgedEvaluation
@@ -197,7 +199,7 @@ class NamedMistake(TypedDict):
     """Of the first of a list: whether the faults that were found explain as much."""
 
 
-class EvaluationObject(Object):
+class EvaluationObject(Reported):
     """Result of `stepdiag evaluate`."""
 
     fit: Fit
@@ -230,6 +232,7 @@ def evaluation_object(
     """What an evaluation found. `written`: its calibration with the date and provenance of its file."""
     return {
         **first_keys("evaluation", warnings),
+        "report": data_of(evaluation_blocks(result, measurement, known, mistakes)),
         "fit": fit_of(written),
         "mistakes": [mistake_of(found) for found in mistakes],
         "files": files,

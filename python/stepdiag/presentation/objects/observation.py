@@ -1,6 +1,6 @@
 """The object of `stepdiag observe --json`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from typing_extensions import TypedDict
@@ -9,6 +9,8 @@ from stepdiag._core import Adjustment, Measurement
 from stepdiag.parameters import KINDS
 from stepdiag.planning.fault_control import Extension
 from stepdiag.planning.observation import Prospect, extents, growth
+from stepdiag.presentation.blocks import data_of
+from stepdiag.presentation.fault_control import control_blocks, extension_blocks
 from stepdiag.presentation.objects.calibration import LargestValue, OpenFinding, findings_of, largest_of
 from stepdiag.presentation.objects.evaluation import (
     ByKind,
@@ -22,7 +24,8 @@ from stepdiag.presentation.objects.evaluation import (
     reliability_of,
     setup_of,
 )
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
+from stepdiag.presentation.observation import observation_blocks, prospect_blocks
 from stepdiag.presentation.prior_effects import cosine_rows, drift_rows
 from stepdiag.presentation.quantity import Quantities, Quantity, quantities, stated
 from stepdiag.scenario.known import Known
@@ -70,7 +73,7 @@ class GrowthExponents(TypedDict):
     squareness: float | None
 
 
-class ObservationObject(Object):
+class ObservationObject(Reported):
     """Result of `stepdiag observe`: of a run without errors, so there is no verdict."""
 
     scenario: str
@@ -101,7 +104,7 @@ class ObservationObject(Object):
 
 
 def observation_object(
-    found: Adjustment, run: Measurement, known: Known, tried: Iterable[Extension], table: Sequence[Prospect]
+    found: Adjustment, run: Measurement, known: Known, tried: Sequence[Extension], table: Sequence[Prospect]
 ) -> ObservationObject:
     """What a plan determines, which faults it controls, and what other numbers of steps would give."""
     plan, calibration = known.plan, found.calibration
@@ -109,6 +112,14 @@ def observation_object(
     exponents: Any = {kind: growth(table, kind) for kind in KINDS}
     return {
         **first_keys("observation", []),
+        "report": data_of(
+            [
+                *observation_blocks(found, run, known),
+                *control_blocks(found.reliability),
+                *extension_blocks(found.reliability, tried),
+                *prospect_blocks(table),
+            ]
+        ),
         "scenario": str(known.path),
         "plan": {
             "volume": quantities("mm", plan.volume),

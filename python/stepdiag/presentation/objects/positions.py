@@ -10,8 +10,10 @@ from stepdiag._core import Calibration
 from stepdiag.positions.evaluation import MeasuredPositions, TargetScatter
 from stepdiag.positions.figures import PositionFigure
 from stepdiag.positions.prediction import PredictedPositions
+from stepdiag.presentation.blocks import Block, data_of
 from stepdiag.presentation.objects.calibration import Fit, fit_of
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
+from stepdiag.presentation.positions import measured_blocks, predicted_blocks
 from stepdiag.presentation.quantity import Quantities, Quantity, quantities, quantity, with_interval
 
 
@@ -89,7 +91,7 @@ class Predicted(TypedDict):
     lines: list[PredictedLine]
 
 
-class PositionsObject(Object):
+class PositionsObject(Reported):
     """Result of `stepdiag positions`."""
 
     file: str
@@ -124,7 +126,7 @@ def measured_object(result: MeasuredPositions, file: Path, warnings: Sequence[st
             for target, direction, count in result.left_out
         ],
     }
-    return _object(file, warnings, own, None)
+    return _object(file, warnings, measured_blocks(result), own, None)
 
 
 def predicted_object(
@@ -149,14 +151,19 @@ def predicted_object(
             for name, line in lines.items()
         ],
     }
-    return _object(file, warnings, None, own)
+    return _object(file, warnings, predicted_blocks(calibration, lines), None, own)
 
 
 def _object(
-    file: Path, warnings: Sequence[str], measured: Measured | None, predicted: Predicted | None
+    file: Path,
+    warnings: Sequence[str],
+    blocks: Iterable[Block],
+    measured: Measured | None,
+    predicted: Predicted | None,
 ) -> PositionsObject:
     return {
         **first_keys("positions", warnings),
+        "report": data_of(blocks),
         "file": str(file),
         "measured": measured,
         "predicted": predicted,

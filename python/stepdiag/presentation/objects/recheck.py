@@ -8,10 +8,12 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, PredictedReading
 from stepdiag.calibration.volume import VolumeErrors
+from stepdiag.presentation.blocks import data_of
 from stepdiag.presentation.objects.calibration import Fit, fit_of
 from stepdiag.presentation.objects.evaluation import Faults, channel_unit, faults_of
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.quantity import Quantity, Unit, quantity, with_interval
+from stepdiag.presentation.verification import recheck_blocks
 from stepdiag.rechecking.recheck import Judged
 
 _UNITS: Final[dict[str, Unit]] = {"scale": "um/m", "bow": "um", "slope": "urad", "squareness": "urad"}
@@ -54,7 +56,7 @@ class Misfit(TypedDict):
     """Read minus predicted."""
 
 
-class RecheckObject(Object):
+class RecheckObject(Reported):
     """Result of `stepdiag recheck`."""
 
     baseline: str
@@ -107,6 +109,7 @@ def recheck_object(
     found = judged.recheck
     return {
         **first_keys("recheck", warnings),
+        "report": data_of(recheck_blocks(judged, measurement, volume)),
         "baseline": str(files[0]),
         "date": judged.baseline.date,
         "fit": fit_of(judged.baseline),

@@ -7,6 +7,8 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.presentation.blocks import data_of
+from stepdiag.presentation.calibration import calibration_blocks
 from stepdiag.presentation.objects.calibration import (
     CalibrationTables,
     Fit,
@@ -15,7 +17,7 @@ from stepdiag.presentation.objects.calibration import (
     largest_of,
     tables_of,
 )
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.quantity import Quantities, quantities
 
 
@@ -28,7 +30,7 @@ class FunctionalPointStraightness(TypedDict):
     """Of the axis' own frame."""
 
 
-class ReportObject(Object):
+class ReportObject(Reported):
     """Result of `stepdiag report`."""
 
     fit: Fit
@@ -44,6 +46,7 @@ def report_object(calibration: Calibration, file: Path, warnings: Sequence[str])
     """What the file of a calibration says."""
     return {
         **first_keys("report", warnings),
+        "report": data_of(calibration_blocks(calibration)),
         "fit": fit_of(calibration),
         "file": str(file),
         "calibration": tables_of(calibration),

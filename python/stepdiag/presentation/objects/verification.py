@@ -7,11 +7,12 @@ from typing import Any, Literal
 from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, LineDeviation, Measurement, Verification
+from stepdiag.presentation.blocks import data_of
 from stepdiag.presentation.objects.calibration import Fit, fit_of
 from stepdiag.presentation.objects.evaluation import Faults, channel_unit, faults_of
-from stepdiag.presentation.objects.writer import Object, first_keys
+from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.quantity import Quantity, quantity
-from stepdiag.presentation.verification import agrees
+from stepdiag.presentation.verification import agrees, verification_blocks
 
 
 class VerifiedLine(TypedDict):
@@ -39,7 +40,7 @@ class WorstReading(TypedDict):
     normalised: float
 
 
-class VerificationObject(Object):
+class VerificationObject(Reported):
     """Result of `stepdiag verify`."""
 
     calibration: str
@@ -74,6 +75,7 @@ def verification_object(
     """How readings agree with a calibration."""
     return {
         **first_keys("verification", warnings),
+        "report": data_of(verification_blocks(verification, measurement, alpha)),
         "calibration": str(files[0]),
         "date": calibration.date,
         "fit": fit_of(calibration),

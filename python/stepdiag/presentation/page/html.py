@@ -76,8 +76,8 @@ def html_of(blocks: Iterable[Block]) -> Markup:
     parts: list[Markup] = []
     for kind, group in groupby(blocks, type):
         if kind is RowBlock:
-            rows = (row for row in group if isinstance(row, RowBlock))
-            parts.append(definitions(((sentence(row.label)[:-1], sentence(row.text)) for row in rows), "lines"))
+            said = (row for row in group if isinstance(row, RowBlock))
+            parts.append(definitions(((sentence(row.label)[:-1], sentence(row.text)) for row in said), "lines"))
             continue
         for block in group:
             match block:

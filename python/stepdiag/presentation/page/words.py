@@ -98,20 +98,20 @@ def verdict_block(contents: Contents) -> Markup:
     if contents.mistakes:
         reason = mistake_reason(mistake_text(contents.mistakes))
         if reason not in calibration.fit_reasons:  # of a file that an older version wrote
-            parts.append(element("p", _sentence(reason)))
+            parts.append(element("p", sentence(reason)))
         edits = [mistake.edit for mistake in contents.mistakes]
         parts.append(element("p", element("strong", "To change:" if len(edits) == 1 else "To change if so:")))
-        parts.append(listed(map(_sentence, edits)))
+        parts.append(listed(map(sentence, edits)))
     if calibration.unverified:
-        parts.append(element("p", element("strong", _sentence(UNVERIFIED))))
+        parts.append(element("p", element("strong", sentence(UNVERIFIED))))
     notes = []
     if calibration.uncertainty_scaled is not None:
         notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
     if calibration.method in NOISE_ALONE:
-        notes.append(_sentence(NOISE_ALONE[calibration.method]))
-    notes.append(_sentence(temperature_text(calibration)))
+        notes.append(sentence(NOISE_ALONE[calibration.method]))
+    notes.append(sentence(temperature_text(calibration)))
     if fit == "accepted":
-        notes.append(_sentence(NOT_SEEN))
+        notes.append(sentence(NOT_SEEN))
     notes.append("All this is about the readings. How accurate the machine is stands in the summary.")
     parts += [element("p", note, class_="note") for note in notes]
     return element(
@@ -123,23 +123,19 @@ def verdict_block(contents: Contents) -> Markup:
     )
 
 
-def _sentence(note: str) -> str:
-    return sentence(note.removeprefix("note: "))
-
-
 def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
     """A few lines that a customer understands."""
     calibration = contents.calibration
     machine = [
         _within(found.figures),
         ("Error in the volume", _volume(contents, found.figures)),
-        ("Largest errors", _sentence("; ".join(_largest(calibration)))),
+        ("Largest errors", sentence("; ".join(_largest(calibration)))),
     ]
     lines: list[tuple[str, object]] = [
         ("Is this calibration valid?", _is_valid(calibration)),
         ("How well known", _how_well(calibration)),
-        *([("Uncertainty budget", _sentence(calibration.budget))] if calibration.budget else []),
-        *([("Conditions used", listed(map(_sentence, calibration.conditions)))] if calibration.conditions else []),
+        *([("Uncertainty budget", sentence(calibration.budget))] if calibration.budget else []),
+        *([("Conditions used", listed(map(sentence, calibration.conditions)))] if calibration.conditions else []),
         ("Not determined", _open(calibration)),
     ]
     warning = {
@@ -162,7 +158,7 @@ def _is_valid(calibration: Calibration) -> Markup:
     answer, rest = _IS_VALID[calibration.fit].split(". ", 1)
     if calibration.unverified:
         answer = "Not known" if calibration.fit == "accepted" else answer
-        rest += f" {_sentence(UNVERIFIED)}"
+        rest += f" {sentence(UNVERIFIED)}"
     return markup(element("strong", f"{answer}."), f" {rest}")
 
 
@@ -424,7 +420,7 @@ def comparison_section(contents: Contents) -> Markup | None:
             f"significant up to {comparison.limit:g}.",
             class_="note",
         ),
-        listed([_sentence(note) for note in notes]) if notes else None,
+        listed([sentence(note) for note in notes]) if notes else None,
     )
 
 
