@@ -188,4 +188,6 @@ def _with_mistakes(error: InvalidArgument, found: list[FoundMistake]) -> Invalid
     """The refusal of a run, with the mistake that explains it, if one does."""
     if not found:
         return error
-    return InvalidArgument("; ".join([str(error), mistake_reason(mistake_text(found)), *change_rows(found)]))
+    return InvalidArgument(
+        "; ".join([str(error), mistake_reason(mistake_text(found)), *map(": ".join, change_rows(found))])
+    )

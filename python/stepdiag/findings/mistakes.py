@@ -27,10 +27,10 @@ class FoundMistake:
     or_faults: bool = False
 
 
-def change_rows(found: Sequence[FoundMistake]) -> Iterator[str]:
-    """What to change; several are alternatives."""
+def change_rows(found: Sequence[FoundMistake]) -> Iterator[tuple[str, str]]:
+    """What to change, with a label; several are alternatives."""
     for one in found:
-        yield f"to change{'' if len(found) == 1 else ' if so'}: {one.edit}"
+        yield f"to change{'' if len(found) == 1 else ' if so'}", one.edit
 
 
 def mistake_text(found: Sequence[FoundMistake]) -> str:

@@ -61,4 +61,4 @@ def _said(known: Known, run: Measurement, adjustment: Adjustment, mistakes: Sequ
     yield from text_of(fit_blocks(verdict_words(adjustment)))
     if mistakes and adjustment.verdict.fit == "accepted":  # by its faults, which were corrected
         yield f"note: {mistake_text(mistakes)}"
-    yield from change_rows(mistakes)
+    yield from map(": ".join, change_rows(mistakes))

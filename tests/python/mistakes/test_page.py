@@ -48,7 +48,7 @@ def test_page_says_what_the_program_says(number: int) -> None:
     scenario = sd.read_scenario(EXAMPLES / "scenario.toml")
     found = sd.find_mistakes(scenario, MADE[number](sd.simulate(scenario)))
     what = re.sub(r" \(variance factor [^)]*\)$", "", mistake_text(found))
-    said = [f"rejected because {mistake_reason(what)}", *change_rows(found)]
+    said = [f"rejected because {mistake_reason(what)}", *map(": ".join, change_rows(found))]
     assert BLOCKS[number].splitlines() == said
 
 

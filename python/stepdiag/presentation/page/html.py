@@ -3,8 +3,11 @@
 import html
 from collections.abc import Iterable, Sequence
 from itertools import groupby
+from typing import Final
 
 from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock, VerdictBlock
+
+_MOST_REASONS: Final = 6
 
 
 class Markup(str):
@@ -76,22 +79,35 @@ def html_of(blocks: Iterable[Block]) -> Markup:
     parts: list[Markup] = []
     for kind, group in groupby(blocks, type):
         if kind is RowBlock:
-            said = (row for row in group if isinstance(row, RowBlock))
-            parts.append(definitions(((sentence(row.label)[:-1], sentence(row.text)) for row in said), "lines"))
+            said = [row for row in group if isinstance(row, RowBlock)]
+            named = [(sentence(row.label)[:-1], sentence(row.text)) for row in said if row.label != "note"]
+            if named:
+                parts.append(definitions(named, "lines"))
+            parts += [element("p", sentence(row.text), class_="note") for row in said if row.label == "note"]
             continue
         for block in group:
             match block:
                 case HeadingBlock(text):
                     parts.append(element("h3", text))
-                case VerdictBlock(headline=headline, why=why, because=because):
+                case VerdictBlock(verdict=verdict, headline=headline, why=why, because=because):
                     parts.append(element("p", element("strong", sentence(headline)), f" {sentence(why)}"))
-                    if because:
-                        parts.append(listed(map(sentence, because)))
+                    parts += _reasons(verdict, because)
                 case TableBlock(rows, columns, title):
                     parts.append(table(title, columns, rows))
                 case NoteBlock(text):
                     parts.append(element("p", sentence(text), class_="note"))
     return markup(*parts)
+
+
+def _reasons(verdict: str, because: Sequence[str]) -> list[Markup]:
+    """A list, of which the first are shown at once."""
+    if not because:
+        return []
+    first, others = because[:_MOST_REASONS], because[_MOST_REASONS:]
+    parts = [element("p", element("strong", f"{verdict} because:".capitalize())), listed(first)]
+    if others:
+        parts.append(element("details", element("summary", f"{len(others)} more reasons"), listed(others)))
+    return parts
 
 
 def section(identifier: str, title: object, *content: object, class_: str | None = None) -> Markup:

@@ -11,14 +11,24 @@ from stepdiag._core import Calibration
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.calibration.volume_change import VolumeChange
-from stepdiag.findings.meaning import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, UNVERIFIED, headline, is_valid
-from stepdiag.findings.mistakes import mistake_text
-from stepdiag.findings.reasons import mistake_reason
+from stepdiag.findings.meaning import PROVENANCE, UNVERIFIED, fit_words, headline, is_valid
 from stepdiag.findings.temperature import temperature_text
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
+from stepdiag.presentation.blocks import NoteBlock
+from stepdiag.presentation.fit import fit_blocks
 from stepdiag.presentation.page.contents import Contents
 from stepdiag.presentation.page.header import TITLES
-from stepdiag.presentation.page.html import Markup, definitions, element, listed, markup, section, sentence, table
+from stepdiag.presentation.page.html import (
+    Markup,
+    definitions,
+    element,
+    html_of,
+    listed,
+    markup,
+    section,
+    sentence,
+    table,
+)
 from stepdiag.presentation.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.presentation.page.volume import ErrorInVolume
 from stepdiag.presentation.volume import length_text, limit_verdict, place_of_largest, why_not_known
@@ -41,7 +51,6 @@ _RESTS_ON: Final = {
 EARLIER: Final = "The earlier calibration is"
 LEAST_PROBABILITY: Final = 1e-12  # that is told
 MOST_EFFECTS: Final = 6
-MOST_REASONS: Final = 6  # that are shown at once
 SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "unchecked": "?", None: "?"}
 
 
@@ -84,36 +93,12 @@ def verdict_block(contents: Contents) -> Markup:
             id="verdict-heading",
         )
     ]
-    meaning = "The file does not say how well the readings agree." if fit is None else f"Fit {fit}: {MEANING[fit]}."
-    factor = calibration.variance_factor
-    if factor is not None:
-        meaning += f" Variance factor {factor:.3g}; 1 is expected."
-    parts.append(element("p", meaning))
-    if calibration.fit_reasons:
-        parts.append(element("p", element("strong", f"{fit or 'not known'} because:".capitalize())))
-        first, others = calibration.fit_reasons[:MOST_REASONS], calibration.fit_reasons[MOST_REASONS:]
-        parts.append(listed(first))
-        if others:
-            parts.append(element("details", element("summary", f"{len(others)} more reasons"), listed(others)))
-    if contents.mistakes:
-        reason = mistake_reason(mistake_text(contents.mistakes))
-        if reason not in calibration.fit_reasons:  # of a file that an older version wrote
-            parts.append(element("p", sentence(reason)))
-        edits = [mistake.edit for mistake in contents.mistakes]
-        parts.append(element("p", element("strong", "To change:" if len(edits) == 1 else "To change if so:")))
-        parts.append(listed(map(sentence, edits)))
-    if calibration.unverified:
-        parts.append(element("p", element("strong", sentence(UNVERIFIED))))
-    notes = []
-    if calibration.uncertainty_scaled is not None:
-        notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
-    if calibration.method in NOISE_ALONE:
-        notes.append(sentence(NOISE_ALONE[calibration.method]))
-    notes.append(sentence(temperature_text(calibration)))
-    if fit == "accepted":
-        notes.append(sentence(NOT_SEEN))
-    notes.append("All this is about the readings. How accurate the machine is stands in the summary.")
-    parts += [element("p", note, class_="note") for note in notes]
+    parts.append(html_of(fit_blocks(fit_words(calibration), contents.mistakes)))
+    about = [
+        temperature_text(calibration),
+        "all this is about the readings; the summary says how accurate the machine is",
+    ]
+    parts.append(html_of(map(NoteBlock, about)))
     return element(
         "section",
         *parts,
