@@ -37,9 +37,8 @@ def comparison_blocks(comparison: Comparison, change: VolumeChange, name_a: str,
     yield HeadingBlock("error of the tool in the volume")
     yield from _volume_blocks(change)
     if comparison.agreement is not None:
-        yield HeadingBlock("agreement with the error map")
         yield from _agreement_rows(comparison.agreement)
-    yield HeadingBlock("differences by parameter: the largest, and the most significant")
+    yield HeadingBlock("differences by parameter")
     yield TableBlock(
         tuple(_row(comparison, difference) for difference in comparison.differences),
         ("", "B - A", "u", "at mm", "(B - A)/u", "at mm", "probability", ""),
@@ -63,16 +62,18 @@ def _volume_blocks(change: VolumeChange) -> Iterator[Block]:
         mark = "µm  significant" if effect.significant else "µm"
         rows.append((effect.parameter, _micrometres(effect.largest), _micrometres(effect.rms), mark))
     if rows:
-        yield TableBlock(tuple(rows), ("differences alone", "largest", "rms", ""), left=(0, 3))
+        yield TableBlock(tuple(rows), ("errors that differences make alone", "largest", "rms", ""), left=(0, 3))
 
 
 def _agreement_rows(agreement: TruthAgreement) -> Iterator[Block]:
     if not agreement.values:
-        yield RowBlock("values", "not known, because the calibration has no standard uncertainties")
+        yield RowBlock(
+            "agreement with the error map", "not known, because the calibration has no standard uncertainties"
+        )
         return
     share = 100.0 * agreement.beyond_two / agreement.values
     yield RowBlock(
-        "values",
+        "agreement with the error map",
         f"{agreement.beyond_two} of {agreement.values} values beyond 2 u ({share:.1f} %; 4.6 % expected), rms "
         f"{agreement.rms:.3g} u",
     )

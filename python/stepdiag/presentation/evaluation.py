@@ -56,12 +56,12 @@ def _published(
 ) -> Iterator[Block]:
     calibration = judged.calibration
     adjusted = "none" if judged.adjustment is None else judged.adjustment.verdict.fit
-    yield from fit_blocks(fit_words(calibration), mistakes)
-    yield RowBlock(
-        "two verdicts",
+    words = fit_words(calibration)
+    two = (
         f"the fit is the worse of the method's own test ({judged.own}) and of the adjustment of the same readings "
-        f"({adjusted})",
+        f"({adjusted})"
     )
+    yield from fit_blocks(words._replace(notes=(("two verdicts", two), *words.notes)), mistakes)
     yield from _what_was_done(calibration, measurement, known)
     yield uncertainty_table(calibration)
     yield from budget_rows(calibration)

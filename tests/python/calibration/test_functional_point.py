@@ -184,7 +184,7 @@ def test_report_tells_shapes_from_errors_and_what_reversal_there_is(
     said = capsys.readouterr().out
     assert "(EXX's shape at 400 mm)" in said
     assert "note: a function of undetermined slope is given by its shape, with both ends at 0" in said
-    assert "-4 µm    (EYX at 400 mm; standard uncertainty not known)" in said
+    assert "-4 µm (EYX at 400 mm; standard uncertainty not known)" in " ".join(said.split())
     assert "signs: actual less commanded" in said
 
 
