@@ -106,7 +106,6 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
         "volume",
         "Error of the tool in the volume",
         element("p", said),
-        html_of(frame_notes(figures)),
         _controls(scale, before is not None, bool(contents.lines)),
         element(
             "figure",
@@ -114,6 +113,7 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
             element("figcaption", element("span", "The picture is being drawn.", id="volume-caption")),
             class_="wide",
         ),
+        html_of(frame_notes(figures)),
         _ranking(figures),
         values("values-volume", "Values in the volume", html_of([figure_table(figures)]), _table(found, before)),
     )
