@@ -18,7 +18,7 @@ def report_unit(name: str) -> Unit:
 
 
 def component_name(name: str, component: int) -> str:
-    """What tells a component from the others: "a" or "b", "x" or "y", "d2"; empty for a single one."""
+    """What distinguishes a component from the others: "a" or "b", "x" or "y", "d2"; empty for a single one."""
     quantity = SETUP_QUANTITIES[name]
     if quantity.of_beams:
         return f"d{component + 1}"

@@ -353,7 +353,7 @@ def recheck(
 
     SCENARIO has plan, head and uncertainties of RUN, and in [change] how far the machine may have
     changed: scales, squarenesses, bows of straightnesses, slopes of angles. Reports whether it has
-    changed, which changes the readings tell one by one, which only together, what may be hidden in
+    changed, which changes the readings determine one by one, which only together, what may be hidden in
     the volume, and the error there now.
 
     Readings that the tests of `evaluate` find wrong are named and left out. If the machine has

@@ -68,7 +68,7 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     "--decide",
     type=_POSITIVE,
     metavar="UM",
-    help="The shortest plan that tells with 95 % whether the largest error is within this limit (µm), for machines "
+    help="The shortest plan that shows with 95 % whether the largest error is within this limit (µm), for machines "
     "with 0.8 of it and with 1.25 of it.",
 )
 @click.option(
@@ -193,14 +193,14 @@ def plan(
     with Progress("faults of the plans in the table") as progress:
         for done, one in enumerate(rows, 1):
             if one.minutes <= aim.minutes:
-                told = with_faults(described, one)
-                found = [told if other is one else other for other in found]
+                tested = with_faults(described, one)
+                found = [tested if other is one else other for other in found]
             progress(done, len(rows))
     choice = choose(found, aim)
     say(inputs_row(known))
     say("largest standard uncertainties by measuring time, for a machine with usual errors (lines: body diagonals/face")
-    say("diagonals/single axes/scale lines; found: smallest wrong distance that is found; told: kinds of faults that")
-    say("are distinguished):")
+    say("diagonals/single axes/scale lines; found: smallest wrong distance that is found; kinds: kinds of faults")
+    say("that are distinguished):")
     for line in plan_rows(shown(found, choice, aim), choice, aim):
         say(line)
     own = own_candidate(known)

@@ -62,7 +62,7 @@ class AdjustmentSection(AdjustmentKeys):
     "free"). Tilts determine the difference of both. What they leave open acts by its square, as an error of the
     distances proportional to the travel, which is part of the uncertainties. The same applies to single axes and faces,
     where distances alone are read, and where beams have constants; an angle that is "free" there counts as known to
-    2000. On a scale line where no reading tells the difference, `reflector_urad` is that of the mirror against the
+    2000. On a scale line where no reading determines the difference, `reflector_urad` is that of the mirror against the
     beam, by default 500."""
 
     angles: Literal["free", "fixed"] = key(
@@ -72,7 +72,7 @@ class AdjustmentSection(AdjustmentKeys):
         "a drift in µm/h of at least 0, or three for X, Y, Z",
         "Standard uncertainty of a drift of the functional point along X, Y, Z, linear in time since the run's first "
         "reading: of spindle, structure or mounts of the heads. Its rates are unknowns with this prior; 0: none. "
-        "Needs the time of every reading; `plan.check_points` tell it.",
+        "Needs the time of every reading; `plan.check_points` determine it.",
         0.0,
     )
     machine_drift_um_per_k: Drift | tuple[Drift, Drift, Drift] = key(

@@ -32,7 +32,7 @@ class InstrumentSection(Section):
     u_scale_ppm: Uncertainty | None = key(
         f"{_uncertainty}, in ppm",
         "Standard uncertainty of the distance scale (wavelength or frequency, without the air), common to all "
-        "distances. No reading tells it from a scale error of the machine.",
+        "distances. No reading distinguishes it from a scale error of the machine.",
         None,
         0.1,
     )

@@ -109,7 +109,7 @@ class MachineErrorsKeys(Section):
     )
     drift_um_per_h: Triple = key(
         "three drifts in µm/h",
-        "Of the functional point along X, Y, Z since the run's first reading, which no temperature of a scale tells; "
+        "Of the functional point along X, Y, Z since the run's first reading, which no temperature of a scale explains; "
         "needs `plan.seconds_per_reading`.",
         (0.0, 0.0, 0.0),
     )
@@ -128,7 +128,7 @@ class PlanSection(Section):
     lines: tuple[str, ...] = key(
         'a list of lines such as "ppp" (three of p, n, 0)',
         'Measured lines: body diagonals such as "npp", face diagonals such as "pp0", single axes such as "p00". Four '
-        "body diagonals do not tell on which of them a distance was wrong or the counter slipped; with face diagonals "
+        "body diagonals do not show on which of them a distance was wrong or the counter slipped; with face diagonals "
         "in the three planes, or `repeats = 2`, they do (`stepdiag observe`).",
         example=["ppp", "npp", "pnp", "nnp"],
     )
@@ -162,7 +162,7 @@ class PlanSection(Section):
     )
     check_points: Annotated[int, Field(ge=0, le=LARGEST_STEPS)] = key(
         f"an integer from 0 to {LARGEST_STEPS}",
-        "After every so many steps the program returns to the check point of the line and reads it again, which tells "
+        "After every so many steps the program returns to the check point of the line and reads it again, which shows "
         "drift from the machine's errors (docs/temperature.md); 0: never. Scale lines have none.",
         0,
         5,

@@ -13,7 +13,7 @@ def fault_rows(faults: Sequence[FaultClass]) -> Iterator[tuple[str, str]]:
 
 
 def fault_text(found: FaultClass) -> str:
-    """What may have happened, whether the readings tell which, and what was done about it; without a full stop."""
+    """What may have happened, whether the readings determine which, and what was done about it; without a full stop."""
     shown = 4
     best, *others = found.members
     texts = [_fault(best), *map(_alternative, others[: shown - 1])]

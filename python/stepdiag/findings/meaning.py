@@ -72,7 +72,7 @@ class FitWords(NamedTuple):
 
 
 def fit_words(calibration: Calibration) -> FitWords:
-    """What the file of a calibration says of its fit, with what no verdict tells."""
+    """What the file of a calibration says of its fit, with what no verdict shows."""
     notes = [("unverified", UNVERIFIED.partition(": ")[2])] if calibration.unverified else []
     if calibration.uncertainty_scaled is not None:
         notes.append(("note", f"all standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}"))

@@ -8,7 +8,7 @@ from stepdiag.findings.reasons import UNCHECKED, reason_texts
 
 
 def verdict_words(adjustment: Adjustment) -> FitWords:
-    """The verdict of an adjustment with its reasons, and what no verdict tells."""
+    """The verdict of an adjustment with its reasons, and what no verdict shows."""
     verdict = adjustment.verdict
     if verdict.fit == "unchecked":
         return FitWords("unchecked", f"unchecked: {UNCHECKED[verdict.reasons[0].finding]}")

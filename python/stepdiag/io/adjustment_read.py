@@ -44,7 +44,7 @@ class SetupEntry(NamedTuple):
 class FaultEntry(NamedTuple):
     """What may have been wrong with a reading; mm or rad, as its channel."""
 
-    number: int  # of its class: the readings do not tell which of a class happened
+    number: int  # of its class: the readings do not determine which of a class happened
     treatment: str
     kind: str
     run: int

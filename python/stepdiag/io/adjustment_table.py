@@ -175,7 +175,7 @@ def _faults(faults: list[FaultClass]) -> dict[str, Any]:
             "class": (
                 number,
                 "number of its class",
-                {"comment": "from 1; the readings do not tell which of a class happened"},
+                {"comment": "from 1; the readings do not determine which of a class happened"},
             ),
             "treatment": (treatment, "what was done about its class"),
             "kind": (

@@ -344,7 +344,7 @@ def _orders(entry: str, copy: Copy) -> Hypotheses:
 
 
 def _chains(entry: str, copy: Copy) -> Hypotheses:
-    """The order of the axes alone: where the bed stands between them, no reading tells."""
+    """The order of the axes alone: no reading shows where the bed stands between them."""
     chain = copy.known.chain
     words = chain.name.split()[1:-1]  # without w and t
     bed = words.index("b")
@@ -357,7 +357,7 @@ def _chains(entry: str, copy: Copy) -> Hypotheses:
         yield Hypothesis(
             entry,
             f"the chain has its axes in the order {' '.join(order)} from workpiece to tool, not {' '.join(stated)}",
-            f'in [machine] write the chain as it is, such as chain = "{name}"; where b stands, no reading tells',
+            f'in [machine] write the chain as it is, such as chain = "{name}"; no reading shows where b stands',
             partial(_with_chain, chain=_core.Chain(name)),
         )
 

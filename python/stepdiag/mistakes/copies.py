@@ -254,7 +254,7 @@ def head_like(head: _core.Head, *, psd_distance: float | None = None, beam_offse
 
 def places(known: Known, *, scale_lines: bool = False) -> Iterator[tuple[list[str] | None, str]]:
     """All lines together, then each; with the words that follow what is wrong there. Of tilts scale lines are no
-    place: they act at second order only there, so that nothing tells of them."""
+    place: they act at second order only there, so that nothing shows them."""
     yield None, "on all lines"
     for line in all_lines(known) if scale_lines else known.plan.lines:
         yield [line], f"on line {line}"

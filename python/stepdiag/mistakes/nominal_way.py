@@ -1,4 +1,4 @@
-"""Distances beside the nominal way: what one line tells by itself, to millimetres, without an adjustment.
+"""Distances beside the nominal way: what one line shows by itself, to millimetres, without an adjustment.
 
 Along a line the distance grows as the functional point goes on, less what machine and set-up do to it, which is below
 what a machine can be. What is grosser is a mistake."""
@@ -113,7 +113,7 @@ def _at(values: Values, place: int) -> float:
 
 
 def axis_lengths(known: Known, ways: Sequence[Way]) -> Values | None:
-    """The edges of a volume in which the distances are those of the plan, mm; None where they do not tell."""
+    """The edges of a volume in which the distances are those of the plan, mm; None where they do not determine it."""
     edges, rows, lengths = np.array(known.plan.volume), [], []
     for way in ways:
         ends = np.flatnonzero(np.isfinite(way.distance))

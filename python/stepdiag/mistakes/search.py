@@ -3,7 +3,7 @@
 A mistake is named where the fit with it undone is better by `CLEAR` in chi-square than with the readings and the
 scenario as they are (relative to the variance factor that is left, so that noise of any size names nothing), is not
 itself rejected, and explains more than the faults of single readings that the adjustment found. What is less than
-`ALTERNATIVE` behind the best is not told from it, and is named with it.
+`ALTERNATIVE` behind the best is not distinguished from it, and is named with it.
 
 Quick fits take plain steps of Gauss-Newton: what fits is at its minimum after a few, and what does not need not be.
 Of many runs some are fitted first, and all only with the best of what explains those."""
@@ -43,7 +43,7 @@ PROMISING: Final = 36.0  # after the screening: what is above is not below `CRED
 MOST_ADJUSTED: Final = 4
 BEGUN: Final = 2  # singles on which a second mistake is sought
 LARGER: Final = 0.7  # of the square sum, which the larger of two mistakes leaves at most
-SCREENING: Final = 3  # steps of Gauss-Newton after which a run that fits is told from the others
+SCREENING: Final = 3  # steps of Gauss-Newton after which a run that fits is distinguished from the others
 ENOUGH: Final = 8  # after which it is at its minimum
 REFINED: Final = 10  # of the best of a screening
 MOST_PARABOLAS: Final = 6
@@ -89,7 +89,7 @@ def find_mistakes(
     """The mistakes of which one would explain why a run and its scenario disagree; none where nothing does, or nothing
     needs to.
 
-    Several mean that the readings do not tell which of them it was. Looks for each entry of the catalogue
+    Several mean that the readings do not determine which of them it was. Looks for each entry of the catalogue
     (docs/mistakes.md) and for two at once.
 
     Args:
@@ -224,7 +224,7 @@ class MistakeSearch:
         some = self._families(self._sample, told if of_faults else None)
 
         def best(whole: Family, of_sample: Family) -> _Tried | None:
-            # Readings of more runs tell less gain.
+            # Readings of more runs show less gain.
             value = _best_of(of_sample, self._sample, self._sample_as_read, 0.5 * CLEAR * self._share)
             if value and self._sample is not self._copy:
                 value = _best_of(whole, self._copy, self._as_read, 0.5 * CLEAR, begin=value)
@@ -280,7 +280,7 @@ class MistakeSearch:
         return self._as_read.excess(factor) - tried.excess(factor)
 
     def _named(self, tried: Sequence[_Tried]) -> list[FoundMistake]:
-        """The best with all that is not told from it, adjusted exactly."""
+        """The best with all that is not distinguished from it, adjusted exactly."""
         if not tried:
             return []
         factor = max(1.0, min(one.fit.factor for one in tried))

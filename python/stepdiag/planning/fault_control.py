@@ -26,7 +26,7 @@ class Extension:
 
 
 def tells_all(controls: Sequence[FaultControl]) -> bool:
-    """Whether each fault that is found is told from all others, and none is uncontrolled."""
+    """Whether each fault that is found is distinguished from all others, and none is uncontrolled."""
     return not any(c.twins or c.uncontrolled for c in controls)
 
 

@@ -39,7 +39,7 @@ ScalePoints = Literal["ends", "steps"]
 # Of two plans whose uncertainties differ by less than this share, the faster one is shown.
 ALIKE: Final = 0.05
 MOST_CANDIDATES: Final = 2000
-# Largest errors of machines, by the limit, that `decide` tells to be within it and not within it.
+# Largest errors of machines, by the limit, that `decide` finds to be within it and not within it.
 WITHIN: Final = 0.8
 
 
@@ -106,13 +106,13 @@ class Outcome:
             return found_from(self.faults or ())
         return max(self.largest.get(kind, math.inf) for kind in KINDS_OF[family])
 
-    def untold(self, family: Family = "faults") -> int:
-        """How many kinds of faults are not told from all others, or not controlled; 0 where faults do not count."""
-        return untold(self.faults or ()) if family == "faults" else 0
+    def undistinguished(self, family: Family = "faults") -> int:
+        """How many kinds of faults are not distinguished from all others, or not controlled; 0 where faults do not count."""
+        return undistinguished(self.faults or ()) if family == "faults" else 0
 
 
-def untold(faults: Sequence[_core.FaultControl]) -> int:
-    """How many kinds of faults are not told from all others, or not controlled."""
+def undistinguished(faults: Sequence[_core.FaultControl]) -> int:
+    """How many kinds of faults are not distinguished from all others, or not controlled."""
     return sum(bool(c.twins or c.uncontrolled or not c.count) for c in faults)
 
 
@@ -141,7 +141,7 @@ def squareness_goal(microradians: float) -> Goal:
 
 
 def deciding_goal(micrometres: float, between_nodes: float | None = None) -> Goal:
-    """Whether the largest error is within a limit L, as `volume --limit` tells it: within where the estimate plus
+    """Whether the largest error is within a limit L, as `volume --limit` decides it: within where the estimate plus
     z u is at most L, not within where the estimate minus z u is above L, z = 1.645 (95 % on one side).
 
     The estimate is itself off by up to z u with 95 %. A machine of a largest error of 0.8 L is therefore called within
@@ -170,7 +170,7 @@ class Aim:
 
     def order(self, one: Outcome) -> tuple[float, ...]:
         """Of two plans, the one with the smaller is the better one."""
-        own = (self.missed(one),) if self.goals else (one.untold(self.family), rounded(one.worst(self.family)))
+        own = (self.missed(one),) if self.goals else (one.undistinguished(self.family), rounded(one.worst(self.family)))
         over = max(one.seconds - self.minutes * MINUTE, 0.0)
         return (over, *own, one.seconds)
 
@@ -214,7 +214,7 @@ def normal(candidate: Candidate) -> Candidate:
 def settings(known: Known) -> list[Candidate]:
     """All combinations of steps, repeats, returns, scale points and backward runs, with the lines of the own plan.
 
-    Backward runs are there to tell reversal errors. Where these are unknowns, the errors of the other direction are no
+    Backward runs are there to determine reversal errors. Where these are unknowns, the errors of the other direction are no
     better known for them: they stay as the scenario has them. Where there are none (`reversal = false`), both are
     tried."""
     keys, own = known.keys.plan_by_time, own_candidate(known)
@@ -403,7 +403,7 @@ def with_faults(scenario: Scenario, one: Outcome) -> Outcome:
 def telling(
     scenario: Scenario, found: Sequence[Outcome], taken: Outcome, family: Family = "volume"
 ) -> tuple[Outcome, Outcome | None]:
-    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that tells all
+    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that distinguishes all
     faults apart, both with their faults; None where none does."""
     own = with_faults(scenario, taken)
     if own.faults and tells_all(own.faults):
@@ -412,9 +412,9 @@ def telling(
         if one.candidate.steps != taken.candidate.steps or one is taken:
             continue
         if _hardly_worse(one, taken, "volume" if family == "faults" else family):
-            told = with_faults(scenario, one)
-            if told.faults and tells_all(told.faults):
-                return own, told
+            tested = with_faults(scenario, one)
+            if tested.faults and tells_all(tested.faults):
+                return own, tested
     return own, None
 
 
@@ -426,14 +426,16 @@ def complete(found: Sequence[Outcome]) -> list[Outcome]:
 
 def _hardly_worse(one: Outcome, other: Outcome, family: Family) -> bool:
     limit = (1.0 + ALIKE) * other.worst(family)
-    return one.untold(family) <= other.untold(family) and one.worst(family) <= limit
+    return one.undistinguished(family) <= other.undistinguished(family) and one.worst(family) <= limit
 
 
 def front(found: Sequence[Outcome], family: Family = "volume") -> list[Outcome]:
     """Of the complete ones, those that no other one beats in time, spacing and what counts, fastest first. What is but
     a little better is not."""
     kept: list[Outcome] = []
-    for one in sorted(complete(found), key=lambda o: (o.seconds, o.spacing, o.untold(family), o.worst(family))):
+    for one in sorted(
+        complete(found), key=lambda o: (o.seconds, o.spacing, o.undistinguished(family), o.worst(family))
+    ):
         if not any(other.spacing <= one.spacing and _hardly_worse(other, one, family) for other in kept):
             kept.append(one)
     return kept
@@ -474,8 +476,10 @@ def choose(found: Sequence[Outcome], aim: Aim) -> Choice:
 
 
 def _much_better(one: Outcome, other: Outcome, family: Family) -> bool:
-    fewer = one.untold(family) < other.untold(family)
-    smaller = one.untold(family) == other.untold(family) and one.worst(family) <= 0.8 * other.worst(family)
+    fewer = one.undistinguished(family) < other.undistinguished(family)
+    smaller = one.undistinguished(family) == other.undistinguished(family) and one.worst(family) <= 0.8 * other.worst(
+        family
+    )
     return one.spacing <= other.spacing and (fewer or smaller)
 
 

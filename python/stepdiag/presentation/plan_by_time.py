@@ -1,4 +1,4 @@
-"""What `stepdiag plan` tells: the table of plans, which one to take, and all of them as a file."""
+"""What `stepdiag plan` says: the table of plans, which one to take, and all of them as a file."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ from stepdiag.planning.plan_by_time import (
     found_from,
     front,
     says_more,
-    untold,
+    undistinguished,
 )
 from stepdiag.presentation.fault_control import distinguished, name
 from stepdiag.presentation.text_columns import text_columns
@@ -28,7 +28,7 @@ from stepdiag.units import MICROMETRE, MICRORADIAN
 
 # Heads of columns with the numbers of lines, by Candidate.counts.
 LINES: Final = {"body diagonal": "body", "face diagonal": "face", "single-axis line": "single", "scale line": "scale"}
-FIGURES: Final = ("volume", "pos.", "str.", "angle", "squ.", "found", "told")
+FIGURES: Final = ("volume", "pos.", "str.", "angle", "squ.", "found", "kinds")
 UNITS: Final = ("µm", *(REPORT_UNIT[kind] for kind in KINDS), "µm", "")
 FAR: Final = 2.0  # times the time that there is: how far the table goes on
 
@@ -67,17 +67,19 @@ def plan_rows(plans: Sequence[Outcome], choice: Choice, aim: Aim) -> Iterator[st
         "backward": lambda c: "yes" if c.backward else "no",
         "returns": lambda c: f"{c.check_points or '-'}",
     }
-    told = {name: said for name, said in settings.items() if len({said(o.candidate) for o in plans} - {"-", "no"}) > 0}
+    settled = {
+        name: said for name, said in settings.items() if len({said(o.candidate) for o in plans} - {"-", "no"}) > 0
+    }
     rows = [
-        ["minutes", "lines", *told, "steps", "spacing", "runs", *FIGURES],
-        ["", "", *("" for _ in told), "", "mm", "", *UNITS],
+        ["minutes", "lines", *settled, "steps", "spacing", "runs", *FIGURES],
+        ["", "", *("" for _ in settled), "", "mm", "", *UNITS],
     ]
     for o in plans:
         c = o.candidate
         chosen = choice.taken is not None and c == choice.taken.candidate
         time = f"{'* ' if chosen else ''}{o.minutes:.1f}"
         counts = "/".join(f"{count}" for count in c.counts.values())
-        plan = [time, counts, *(said(c) for said in told.values()), f"{c.steps}", f"{o.spacing:.3g}", f"{c.repeats}"]
+        plan = [time, counts, *(said(c) for said in settled.values()), f"{c.steps}", f"{o.spacing:.3g}", f"{c.repeats}"]
         rows.append([*plan, _volume(o), *(_cell(kind, o) for kind in KINDS), *_faults(o)])
     table = list(text_columns(rows, left=()))
     in_time = sum(o.minutes <= aim.minutes for o in plans)
@@ -100,7 +102,10 @@ def _faults(one: Outcome) -> list[str]:
         return ["", ""]
     size = found_from(one.faults)
     kinds = len(one.faults)
-    return [f"{size / MICROMETRE:.3g}" if math.isfinite(size) else "-", f"{kinds - untold(one.faults)}/{kinds}"]
+    return [
+        f"{size / MICROMETRE:.3g}" if math.isfinite(size) else "-",
+        f"{kinds - undistinguished(one.faults)}/{kinds}",
+    ]
 
 
 def advice(found: Sequence[Outcome], aim: Aim) -> Iterator[str]:
@@ -232,4 +237,4 @@ def _finite(length: float) -> float | None:
 def _fault_cells(one: Outcome) -> list[float | int | None]:
     if not one.faults:
         return [None, None, None]
-    return [_finite(found_from(one.faults)), len(one.faults) - untold(one.faults), len(one.faults)]
+    return [_finite(found_from(one.faults)), len(one.faults) - undistinguished(one.faults), len(one.faults)]

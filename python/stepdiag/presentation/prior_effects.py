@@ -32,7 +32,7 @@ def rounding_rows(rounded: Iterable[RoundedChannel]) -> Iterator[str]:
 
 
 def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
-    """What angles that no reading tells may do to lengths."""
+    """What angles that no reading determines may do to lengths."""
     if known.signals == ("distance",):
         yield (
             "lines without tilts: a laser at an angle to its line reads wrong by the square of it; laser_urad in "
@@ -41,16 +41,16 @@ def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
     keys = known.keys.adjustment
     lines: dict[tuple[bool, float, float], list[str]] = {}
     for line in known.plan.scale_lines:
-        is_told = _tilts_tell(measurement, known, line)
+        is_known = _tilts_determine(measurement, known, line)
         laser = scale_line_angle(keys, line, "laser")
-        mirror = scale_line_angle(keys, line, "reflector", is_told=is_told)
-        if not is_told and mirror == 0.0:
-            is_told, mirror = True, math.inf  # tied to the beam
-        if mirror > 0.0 and (laser > 0.0 or not is_told):
-            lines.setdefault((is_told, laser, mirror), []).append(line)
-    for (is_told, laser, mirror), names in lines.items():
+        mirror = scale_line_angle(keys, line, "reflector", is_known=is_known)
+        if not is_known and mirror == 0.0:
+            is_known, mirror = True, math.inf  # tied to the beam
+        if mirror > 0.0 and (laser > 0.0 or not is_known):
+            lines.setdefault((is_known, laser, mirror), []).append(line)
+    for (is_known, laser, mirror), names in lines.items():
         which = f"scale lines {', '.join(names)}: "
-        if not is_told:
+        if not is_known:
             # D^2 - D l - l^2/2 of two directions.
             mean = 2.0 * mirror**2 - laser**2
             yield (
@@ -60,9 +60,9 @@ def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
                 "in the uncertainties, not corrected"
             )
             continue
-        # (a^2 + b^2)/2 of two normal angles, of this variance each once a tilt has told their difference.
+        # (a^2 + b^2)/2 of two normal angles, of this variance each once a tilt determines their difference.
         short = 1.0 / (laser**-2 + mirror**-2)
-        known_of_mirror = f", the mirror square to it to {mirror * MICRO:g} µrad; beyond what their tilts tell it reads"
+        known_of_mirror = f", the mirror square to it to {mirror * MICRO:g} µrad; beyond what their tilts show it reads"
         yield (
             f"{which}a laser that stands along the axis to {laser * MICRO:g} µrad"
             f"{known_of_mirror if math.isfinite(mirror) else ' reads'} too short, never too long, by "
@@ -70,7 +70,7 @@ def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
         )
 
 
-def _tilts_tell(measurement: Measurement, known: Known, line: str) -> bool:
+def _tilts_determine(measurement: Measurement, known: Known, line: str) -> bool:
     """Whether reflector less laser is known on a line."""
     if known.head.layout == "multi_beam":
         keys = known.keys.adjustment

@@ -1,4 +1,4 @@
-"""What `stepdiag plan --recheck` tells: the table of plans, the one to take and what it shows, and all as a file."""
+"""What `stepdiag plan --recheck` says: the table of plans, the one to take and what it shows, and all as a file."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -49,19 +49,19 @@ def setup_table(
     """A table of what was found, as 12.34(56): the uncertainty of the last digits in brackets; without `values` the
     standard uncertainties alone. Its rows: names, units, then by run, and in it in the order of `lines`. Beside it,
     notes on unknowns of which next to nothing was learnt."""
-    told = sorted((e for e in estimates if e.prior > 0.0), key=lambda e: (e.run, lines.index(e.line)))
-    learnt = [e for e in told if e.value is None or e.standard_uncertainty < NOTHING_LEARNT * e.prior]
+    unknowns = sorted((e for e in estimates if e.prior > 0.0), key=lambda e: (e.run, lines.index(e.line)))
+    learnt = [e for e in unknowns if e.value is None or e.standard_uncertainty < NOTHING_LEARNT * e.prior]
     found = {(e.quantity, e.component) for e in learnt if e.value is not None}
     columns = sorted(found, key=lambda column: (list(SETUP_QUANTITIES).index(column[0]), column[1]))
     rows = _table(learnt, columns, _value if values else _uncertainty) if columns else []
     prior: dict[str, list[SetupFound]] = {}
-    for estimate in told:
+    for estimate in unknowns:
         if estimate not in learnt:
             prior.setdefault(estimate.quantity, []).append(estimate)
     notes = []
     for quantity, known in prior.items():
         unit, native = report_unit(quantity)
-        everywhere = len(known) == sum(e.quantity == quantity for e in told)
+        everywhere = len(known) == sum(e.quantity == quantity for e in unknowns)
         places = "every line" if everywhere else ", ".join(dict.fromkeys(e.line for e in known))
         widths = ", ".join(dict.fromkeys(f"{e.prior / native:g}" for e in known))
         name = quantity.replace("_", " ")

@@ -1,4 +1,4 @@
-"""What `stepdiag uncertainty` tells: what is uncertain, tables by family, budgets, and the two methods side by side."""
+"""What `stepdiag uncertainty` says: what is uncertain, tables by family, budgets, and the two methods side by side."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -146,12 +146,12 @@ def _validation_table(result: UncertaintyResult) -> Iterator[str]:
     ratio = difference / np.asarray(found.delta)
     rows, reasons = [], []
     for family, members in result.families():
-        told = members[np.isfinite(ratio[members])]
+        finite = members[np.isfinite(ratio[members])]
         validated = sum(bool(found.validated[k]) for k in members)
-        if not len(told):
+        if not len(finite):
             rows.append([family, f"{validated} of {len(members)}", "-", "-", "-", "-"])
             continue
-        worst = int(told[np.argmax(ratio[told])])
+        worst = int(finite[np.argmax(ratio[finite])])
         unit, sizes = result.outputs[worst].unit, (difference[worst], found.delta[worst], found.sampling[worst])
         name = report_value(unit, 0.0)[1]
         cells = [f"{report_value(unit, float(size))[0]:.2g} {name}".rstrip() for size in sizes]

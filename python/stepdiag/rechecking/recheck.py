@@ -100,7 +100,7 @@ class Judged:
 
     @cached_property
     def hidden(self) -> float:
-        """What a change that the readings do not tell may move the tool by, mm: twice the standard
+        """What a change that the readings do not determine may move the tool by, mm: twice the standard
         deviation of the functional point at the worst point of the volume, with the priors."""
         shape = self.recheck.shape
         return 2.0 * farthest_move(self.baseline, shape @ self.recheck.covariance @ shape.T)

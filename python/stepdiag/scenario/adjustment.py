@@ -92,15 +92,15 @@ def change_priors(keys: ChangeSection) -> _core.ChangePriors:
     )
 
 
-def scale_line_angle(keys: AdjustmentSection, line: str, quantity: str, *, is_told: bool = True) -> float:
+def scale_line_angle(keys: AdjustmentSection, line: str, quantity: str, *, is_known: bool = True) -> float:
     """The standard uncertainty of each angle of the laser or the reflector of a scale line, rad; 0: fixed.
 
-    is_told: whether readings of the line tell the angle of the reflector against the laser."""
+    is_known: whether readings of the line determine the angle of the reflector against the laser."""
     record = SETUP_QUANTITIES[quantity]
     own = keys.by_line.get(line)
     choice = None if own is None else getattr(own, record.key)
     if choice is None:
-        return record.scale_line_prior if is_told else record.scale_line_usual
+        return record.scale_line_prior if is_known else record.scale_line_usual
     if isinstance(choice, str):
-        return 0.0 if choice == "fixed" else math.inf if is_told else record.usual
+        return 0.0 if choice == "fixed" else math.inf if is_known else record.usual
     return float(choice) * MICRORADIAN

@@ -1,6 +1,6 @@
 """Inputs that no workshop has: temperatures, coefficients, air and times of scenarios and runs against the limits of
 `[plausible.inputs]`. What an input is refused with says what its number looks like; what is beyond the inner limits
-is told, and makes a fit at best doubtful."""
+is named, and makes a fit at best doubtful."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

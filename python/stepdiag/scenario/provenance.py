@@ -1,4 +1,4 @@
-"""What a calibration is made from, so that it can be told from which run and which scenario it came."""
+"""What a calibration is made from, so that one can see from which run and which scenario it came."""
 
 import hashlib
 import json

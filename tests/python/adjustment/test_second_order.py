@@ -138,9 +138,9 @@ def test_beams_of_unknown_constants_leave_the_mirror_of_a_scale_line_to_its_prio
 
 def test_tilts_of_aligned_scale_lines_narrow_what_they_tell_and_no_more() -> None:
     run = run_of(2, STANDARD, {})
-    told, untold = adjusted(run, STANDARD), adjusted(without_tilts_of_scale_lines(run), STANDARD)
+    told, undistinguished = adjusted(run, STANDARD), adjusted(without_tilts_of_scale_lines(run), STANDARD)
     for name, (_, _, u) in told.calibration.functions.items():
-        assert np.all(u <= untold.calibration.functions[name][2] * (1 + 1e-9))
+        assert np.all(u <= undistinguished.calibration.functions[name][2] * (1 + 1e-9))
 
 
 def scale_lasers_aside(rng: np.random.Generator) -> dict[str, sd.Misalignment]:

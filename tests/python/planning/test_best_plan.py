@@ -146,12 +146,12 @@ def test_power_against_faults_is_a_merit() -> None:
     found = best_plans(scenario, aim)
     taken = choose(found, aim).taken
     own = next(o for o in found if o.candidate == own_candidate(scenario.known))
-    assert own.untold() > 0  # four body diagonals do not tell a wrong distance from its twin
+    assert own.undistinguished() > 0  # four body diagonals do not tell a wrong distance from its twin
     assert taken is not None
-    assert taken.untold() == 0
-    assert min(o.worst("faults") for o in complete(found) if o.minutes <= 30.0 and not o.untold()) == pytest.approx(
-        taken.worst("faults"), rel=1e-6
-    )
+    assert taken.undistinguished() == 0
+    assert min(
+        o.worst("faults") for o in complete(found) if o.minutes <= 30.0 and not o.undistinguished()
+    ) == pytest.approx(taken.worst("faults"), rel=1e-6)
 
 
 def test_verdict_is_certain_for_machines_at_four_fifths_and_five_fourths_of_the_limit() -> None:
@@ -204,7 +204,7 @@ def test_new_scenario_has_the_best_plan_for_45_minutes_and_says_what_it_gives() 
     assert taken is not None
     assert taken.candidate == own_candidate(scenario.known)
     own = with_faults(scenario, taken)
-    assert own.untold() == 0
+    assert own.undistinguished() == 0
     before = outcome(scenario, replace(own.candidate, lines=LINES[:4], repeats=1, scale_points="ends"))
     for one in (own, before):
         assert f"{one.minutes:.1f} minutes" in WHY

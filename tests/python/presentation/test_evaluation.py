@@ -110,7 +110,7 @@ def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: p
     assert "scale lines 00p: a laser that stands along the axis to 500 µrad" in said
     # Both known to 500 urad: a tilt leaves half of the variance.
     assert "0p0: a laser that stands along the axis to 500 µrad, the mirror square to it to 500 µrad" in said
-    assert "beyond what their tilts tell it reads too short, never too long, by 0.12 µm/m" in said
+    assert "beyond what their tilts show it reads too short, never too long, by 0.12 µm/m" in said
 
 
 def test_scale_lines_whose_mirror_no_reading_tells_have_a_word_on_it(

@@ -191,18 +191,18 @@ struct KnownCombination {
 };
 
 // Which faults of one kind the readings control (reliability, W. Baarda 1968), to first order. A test finds a fault
-// with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size; it is told from
-// another one where chi-square with that one would be larger by 25. Two faults are twins, which no size tells apart,
-// where their effects on the readings have a correlation of 0.999 and more and those on the calibration differ. Of long
-// runs the faults of evenly spaced places stand for all.
+// with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size; it is
+// distinguished from another one where chi-square with that one would be larger by 25. Two faults are twins, which no
+// size distinguishes, where their effects on the readings have a correlation of 0.999 and more and those on the
+// calibration differ. Of long runs the faults of evenly spaced places stand for all.
 struct FaultControl {
     FaultKind kind;
-    std::string channel;      // "distance" (of all beams), "tilt" or "spot"
-    int count = 0;            // of controlled faults, one a place
-    int uncontrolled = 0;     // more of them, which no other reading controls
-    int twins = 0;            // those of `count` that have a twin
-    double found_from = 0.0;  // all of `count` are found from this size on; mm or rad
-    double distinguished_from = 0.0;   // those without a twin are told from all others from this size on
+    std::string channel;              // "distance" (of all beams), "tilt" or "spot"
+    int count = 0;                    // of controlled faults, one a place
+    int uncontrolled = 0;             // more of them, which no other reading controls
+    int twins = 0;                    // those of `count` that have a twin
+    double found_from = 0.0;          // all of `count` are found from this size on; mm or rad
+    double distinguished_from = 0.0;  // those without a twin are, from this size on
 
     // Largest of the calibrated values of one kind (mm or rad).
     struct Effect {

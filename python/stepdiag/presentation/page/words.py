@@ -49,7 +49,7 @@ _RESTS_ON: Final = {
     None: "Whether the calibration is valid is not known.",
 }
 EARLIER: Final = "The earlier calibration is"
-LEAST_PROBABILITY: Final = 1e-12  # that is told
+LEAST_PROBABILITY: Final = 1e-12  # that is shown
 MOST_EFFECTS: Final = 6
 SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "unchecked": "?", None: "?"}
 
