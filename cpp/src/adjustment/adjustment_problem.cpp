@@ -399,6 +399,31 @@ bool is_zero_at_end(Axis axis, int component) {
 }  // namespace
 
 void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options, Elimination elimination) {
+    const int blocks = number_nodes(options);
+    const int first_of_set_ups = border_;
+    for (LineSetup& setup : setups_)
+        for (int c = 0; c < int(setup.prior.size()); ++c)
+            if (setup.prior[c] != fixed_unknown) {
+                setup.unknown[c] = 6 * blocks + border_++;
+                setup.active.push_back(c);
+            }
+    if (expansion_)
+        for (const AxisGroup& axes : coefficient_groups(*expansion_))
+            if (const double prior = expansion_->standard_uncertainty[axes.front()]; prior > 0.0)
+                coefficients_.push_back({axes, prior, false, 6 * blocks + border_++});
+    if (options.machine_drift)
+        for (int a = 0; a < 3; ++a)
+            if (const double prior = options.machine_drift->standard_uncertainty[a]; prior > 0.0)
+                coefficients_.push_back({{a}, prior, true, 6 * blocks + border_++});
+    find_reach(blocks, options);
+    choose_elimination(elimination, first_of_set_ups);
+    sort_points();
+    weigh_unknowns();
+}
+
+// Inner nodes are blocks of the band, from both ends of the axes inwards; what is left of the others is of the border.
+// Returns the number of blocks.
+int AdjustmentProblem::number_nodes(const AdjustmentOptions& options) {
     const int steps = plan_.steps();
     std::vector<int> banded;
     for (std::size_t i = 0; i < nodes_.size(); ++i)
@@ -414,32 +439,19 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options, Elimin
         for (int c = 0; c < 6; ++c)
             if (c < 3 || options.rotations) node.unknown[c] = int(6 * b) + c;
     }
-    const int banded_unknowns = int(6 * banded.size());
     for (AxisNode& node : nodes_) {
         if (node.block != no_unknown) continue;
         for (int c = 0; c < 6; ++c)
             if ((c < 3 || options.rotations) && (node.negative || !is_zero_at_end(node.axis, c)))
-                node.unknown[c] = banded_unknowns + border_++;
+                node.unknown[c] = int(6 * banded.size()) + border_++;
     }
-    const int first_of_set_ups = border_;
-    for (LineSetup& setup : setups_)
-        for (int c = 0; c < int(setup.prior.size()); ++c)
-            if (setup.prior[c] != fixed_unknown) {
-                setup.unknown[c] = banded_unknowns + border_++;
-                setup.active.push_back(c);
-            }
+    return int(banded.size());
+}
 
-    if (expansion_)
-        for (const AxisGroup& axes : coefficient_groups(*expansion_))
-            if (const double prior = expansion_->standard_uncertainty[axes.front()]; prior > 0.0)
-                coefficients_.push_back({axes, prior, false, banded_unknowns + border_++});
-    if (options.machine_drift)
-        for (int a = 0; a < 3; ++a)
-            if (const double prior = options.machine_drift->standard_uncertainty[a]; prior > 0.0)
-                coefficients_.push_back({{a}, prior, true, banded_unknowns + border_++});
-
-    reach_.resize(banded.size());
-    for (std::size_t b = 0; b < banded.size(); ++b) reach_[b] = int(b);
+// The last block that each block is coupled to: by readings, by both directions of approach, by smoothness.
+void AdjustmentProblem::find_reach(int blocks, const AdjustmentOptions& options) {
+    reach_.resize(std::size_t(blocks));
+    for (std::size_t b = 0; b < reach_.size(); ++b) reach_[b] = int(b);
     const auto couple = [&](int i, int j) {
         if (i == no_unknown || j == no_unknown) return;
         const int a = nodes_[i].block, b = nodes_[j].block;
@@ -450,7 +462,7 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options, Elimin
         for (int a = 0; a < 3; ++a) couple(point.node[a], point.node[(a + 1) % 3]);
     for (const Axis axis : all_axes) {
         const auto &both = node_at_[2 * index(axis)], &negative = node_at_[2 * index(axis) + 1];
-        for (int k = 0; k <= steps; ++k) couple(both[k], negative[k]);
+        for (int k = 0; k <= plan_.steps(); ++k) couple(both[k], negative[k]);
     }
     if (options.smoothness)
         for (const auto& chain : node_chains())
@@ -459,11 +471,6 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options, Elimin
                 if (k + 2 < chain.size()) couple(chain[k], chain[k + 2]);
             }
     for (std::size_t b = 1; b < reach_.size(); ++b) reach_[b] = std::max(reach_[b], reach_[b - 1]);
-
-    choose_elimination(elimination, first_of_set_ups);
-    sort_points();
-
-    weigh_unknowns();
 }
 
 // By the multiplications of a factorisation.

@@ -161,6 +161,8 @@ private:
     void collect_points(const Measurement& measurement, const AdjustmentOptions& options);
     void round_uncertainties();
     void number_unknowns(const AdjustmentOptions& options, Elimination elimination);
+    int number_nodes(const AdjustmentOptions& options);
+    void find_reach(int blocks, const AdjustmentOptions& options);
     void choose_elimination(Elimination elimination, int first_of_set_ups);
     void sort_points();
     void weigh_unknowns();

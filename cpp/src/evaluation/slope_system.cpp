@@ -96,92 +96,111 @@ SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan,
 
 void SlopeSystem::solve_equations(const std::vector<Equation>& equations, const std::vector<Pass>& passes,
                                   const Plan& plan) {
-    constexpr std::size_t few = 40;  // passes, of which all unknowns are solved at once
-    std::vector<bool> is_eliminated(passes.size(), passes.size() > few);
-    for (const Equation& equation : equations)
-        for (const auto& [unknown, coefficient] : equation.coefficient) {
-            const int pass = (unknown - first_laser_angle) / 2;
-            if (unknown >= first_laser_angle && coefficient != 0.0 && pass != equation.pass)
-                is_eliminated[std::size_t(pass)] = false;
-        }
-    std::vector<int> place(unknowns_, -1);
-    for (int j = 0; j < int(unknowns_); ++j) {
-        if (j >= first_laser_angle && is_eliminated[std::size_t((j - first_laser_angle) / 2)]) continue;
-        place[std::size_t(j)] = int(kept_.size());
-        kept_.push_back(j);
-    }
-    const Eigen::Index kept = Eigen::Index(kept_.size());
-    const auto row_of = [&](const Equation& equation) {
-        Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(kept);
-        for (const auto& [unknown, coefficient] : equation.coefficient)
-            if (const int j = place[std::size_t(unknown)]; j >= 0) row[j] = coefficient;
-        return row;
-    };
-    std::vector<Eigen::RowVectorXd> reduced;
-    std::vector<double> uncertainty;
+    Reduced reduced = choose_kept(equations, passes);
     for (std::size_t e = 0; e < equations.size(); ++e) {
-        if (is_eliminated[std::size_t(equations[e].pass)]) continue;
+        if (reduced.is_eliminated[std::size_t(equations[e].pass)]) continue;
         direct_.push_back(int(e));
-        reduced.push_back(row_of(equations[e]));
-        uncertainty.push_back(equations[e].standard_uncertainty);
+        reduced.rows.push_back(row_of(equations[e], reduced));
+        reduced.standard_uncertainty.push_back(equations[e].standard_uncertainty);
     }
-    // Angles that nothing tells, and which change lengths of their pass.
-    std::vector<std::pair<int, Eigen::Vector2d>> open;
+    // Angles that nothing determines, and which change lengths of their pass.
     const auto note_open = [&](int pass, const Eigen::Vector2d& angles) {
         double largest = 0.0;
         for (const PassPoint& point : passes[std::size_t(pass)].points)
             largest = std::max(largest, std::abs(point.lateral.y() * angles[0] - point.lateral.x() * angles[1]));
-        if (largest > 1e-9 * plan.volume().norm()) open.emplace_back(laser_angle(pass, 0), angles);
+        if (largest > 1e-9 * plan.volume().norm()) reduced.open.emplace_back(laser_angle(pass, 0), angles);
     };
     std::vector<bool> has_equations(passes.size(), false);
     for (const Equation& equation : equations) has_equations[std::size_t(equation.pass)] = true;
     for (int pass = 0; pass < int(passes.size()); ++pass)
-        for (int k = 0; k < 2 && is_eliminated[std::size_t(pass)] && !has_equations[std::size_t(pass)]; ++k)
+        for (int k = 0; k < 2 && reduced.is_eliminated[std::size_t(pass)] && !has_equations[std::size_t(pass)]; ++k)
             note_open(pass, Eigen::Vector2d::Unit(k));
     for (std::size_t e = 0, end; e < equations.size(); e = end) {
         const int pass = equations[e].pass;
         for (end = e; end < equations.size() && equations[end].pass == pass;) ++end;
-        if (!is_eliminated[std::size_t(pass)]) continue;
-        const Eigen::Index count = Eigen::Index(end - e);
-        Eigen::MatrixXd by_angle = Eigen::MatrixXd::Zero(count, 2), by_kept(count, kept);
-        Eigen::VectorXd u(count);
-        const int first = laser_angle(pass, 0);
-        for (Eigen::Index i = 0; i < count; ++i) {
-            const Equation& equation = equations[e + std::size_t(i)];
-            for (int k = 0; k < 2; ++k)
-                if (const auto found = equation.coefficient.find(first + k); found != equation.coefficient.end())
-                    by_angle(i, k) = found->second;
-            by_kept.row(i) = row_of(equation);
-            u[i] = equation.standard_uncertainty;
-        }
-        const LeastSquares angles = solve_least_squares(by_angle, u);
-        Eliminated& own = eliminated_.emplace_back();
-        own.first_angle = first;
-        own.first_equation = int(e);
-        own.inverse = angles.pseudoinverse;
-        own.by_kept = angles.pseudoinverse * by_kept;
-        own.without = angles.contradictions.matrix();
-        const Eigen::MatrixXd rest = own.without * by_kept;
-        for (Eigen::Index row = 0; row < rest.rows(); ++row) {
-            reduced.push_back(rest.row(row));
-            // Weights are relative to the pass's best equation, and rows of Q have length 1.
-            uncertainty.push_back(u.minCoeff());
-        }
-        const Eigen::Matrix2d projector = Eigen::Matrix2d::Identity() - angles.pseudoinverse * by_angle;
+        if (!reduced.is_eliminated[std::size_t(pass)]) continue;
+        const Eigen::Matrix2d projector = eliminate_angles(equations, e, end, reduced);
         for (int k = 0; k < 2; ++k)
-            if (!angles.determined[std::size_t(k)]) note_open(pass, projector.col(k));
+            if (projector.col(k) != Eigen::Vector2d::Zero()) note_open(pass, projector.col(k));
     }
+    solve_kept(reduced);
+}
 
-    Eigen::MatrixXd matrix(Eigen::Index(reduced.size()), kept);
-    for (std::size_t i = 0; i < reduced.size(); ++i) matrix.row(Eigen::Index(i)) = reduced[i];
+// All unknowns of few passes are solved at once; of many, a pass whose angles only its own equations have loses them.
+SlopeSystem::Reduced SlopeSystem::choose_kept(const std::vector<Equation>& equations, const std::vector<Pass>& passes) {
+    constexpr std::size_t few = 40;
+    Reduced reduced;
+    reduced.is_eliminated.assign(passes.size(), passes.size() > few);
+    for (const Equation& equation : equations)
+        for (const auto& [unknown, coefficient] : equation.coefficient) {
+            const int pass = (unknown - first_laser_angle) / 2;
+            if (unknown >= first_laser_angle && coefficient != 0.0 && pass != equation.pass)
+                reduced.is_eliminated[std::size_t(pass)] = false;
+        }
+    reduced.place.assign(unknowns_, -1);
+    for (int j = 0; j < int(unknowns_); ++j) {
+        if (j >= first_laser_angle && reduced.is_eliminated[std::size_t((j - first_laser_angle) / 2)]) continue;
+        reduced.place[std::size_t(j)] = int(kept_.size());
+        kept_.push_back(j);
+    }
+    return reduced;
+}
+
+Eigen::RowVectorXd SlopeSystem::row_of(const Equation& equation, const Reduced& reduced) const {
+    Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(Eigen::Index(kept_.size()));
+    for (const auto& [unknown, coefficient] : equation.coefficient)
+        if (const int j = reduced.place[std::size_t(unknown)]; j >= 0) row[j] = coefficient;
+    return row;
+}
+
+// Of the equations first to end, which are one pass's. Returns the projector on the angles that they leave open: a
+// column of 0 for an angle that they determine.
+Eigen::Matrix2d SlopeSystem::eliminate_angles(const std::vector<Equation>& equations, std::size_t first,
+                                              std::size_t end, Reduced& reduced) {
+    const Eigen::Index count = Eigen::Index(end - first);
+    Eigen::MatrixXd by_angle = Eigen::MatrixXd::Zero(count, 2), by_kept(count, Eigen::Index(kept_.size()));
+    Eigen::VectorXd u(count);
+    const int first_angle = laser_angle(equations[first].pass, 0);
+    for (Eigen::Index i = 0; i < count; ++i) {
+        const Equation& equation = equations[first + std::size_t(i)];
+        for (int k = 0; k < 2; ++k)
+            if (const auto found = equation.coefficient.find(first_angle + k); found != equation.coefficient.end())
+                by_angle(i, k) = found->second;
+        by_kept.row(i) = row_of(equation, reduced);
+        u[i] = equation.standard_uncertainty;
+    }
+    const LeastSquares angles = solve_least_squares(by_angle, u);
+    Eliminated& own = eliminated_.emplace_back();
+    own.first_angle = first_angle;
+    own.first_equation = int(first);
+    own.inverse = angles.pseudoinverse;
+    own.by_kept = angles.pseudoinverse * by_kept;
+    own.without = angles.contradictions.matrix();
+    const Eigen::MatrixXd rest = own.without * by_kept;
+    for (Eigen::Index row = 0; row < rest.rows(); ++row) {
+        reduced.rows.push_back(rest.row(row));
+        // Weights are relative to the pass's best equation, and rows of Q have length 1.
+        reduced.standard_uncertainty.push_back(u.minCoeff());
+    }
+    Eigen::Matrix2d projector = Eigen::Matrix2d::Identity() - angles.pseudoinverse * by_angle;
+    for (int k = 0; k < 2; ++k)
+        if (angles.determined[std::size_t(k)]) projector.col(k).setZero();
+    return projector;
+}
+
+void SlopeSystem::solve_kept(const Reduced& reduced) {
+    const Eigen::Index kept = Eigen::Index(kept_.size());
+    Eigen::MatrixXd matrix(Eigen::Index(reduced.rows.size()), kept);
+    for (std::size_t i = 0; i < reduced.rows.size(); ++i) matrix.row(Eigen::Index(i)) = reduced.rows[i];
     const LeastSquares solution = solve_least_squares(
-        matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
+        matrix, Eigen::Map<const Eigen::VectorXd>(reduced.standard_uncertainty.data(),
+                                                  Eigen::Index(reduced.standard_uncertainty.size())));
     inverse_ = solution.pseudoinverse;
     contradictions_ = solution.contradictions;
     determined_ = solution.determined;
     const Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(kept, kept) - solution.pseudoinverse * matrix;
     const auto undetermined = std::count(determined_.begin(), determined_.end(), false);
-    null_space_.setZero(Eigen::Index(unknowns_), undetermined + Eigen::Index(open.size()));
+    null_space_.setZero(Eigen::Index(unknowns_), undetermined + Eigen::Index(reduced.open.size()));
     Eigen::Index column = 0;
     for (Eigen::Index j = 0; j < kept; ++j) {
         if (determined_[std::size_t(j)]) continue;
@@ -190,7 +209,7 @@ void SlopeSystem::solve_equations(const std::vector<Equation>& equations, const 
             null_space_.col(column).segment<2>(pass.first_angle) = -pass.by_kept * projector.col(j);
         ++column;
     }
-    for (const auto& [first, angles] : open) null_space_.col(column++).segment<2>(first) = angles;
+    for (const auto& [first, angles] : reduced.open) null_space_.col(column++).segment<2>(first) = angles;
 }
 
 }  // namespace stepdiag

@@ -78,7 +78,20 @@ private:
         std::map<int, double> coefficient;  // by unknown
         double standard_uncertainty;
     };
+    // The system of the unknowns that are kept, while it is made: its rows, and the angles that nothing determines.
+    struct Reduced {
+        std::vector<bool> is_eliminated;  // by pass: its angles
+        std::vector<int> place;           // of each unknown among those that are kept; -1: it is not
+        std::vector<Eigen::RowVectorXd> rows;
+        std::vector<double> standard_uncertainty;
+        std::vector<std::pair<int, Eigen::Vector2d>> open;  // first angle of a pass, and a direction
+    };
     void solve_equations(const std::vector<Equation>& equations, const std::vector<Pass>& passes, const Plan& plan);
+    Reduced choose_kept(const std::vector<Equation>& equations, const std::vector<Pass>& passes);
+    Eigen::RowVectorXd row_of(const Equation& equation, const Reduced& reduced) const;
+    Eigen::Matrix2d eliminate_angles(const std::vector<Equation>& equations, std::size_t first, std::size_t end,
+                                     Reduced& reduced);
+    void solve_kept(const Reduced& reduced);
     template <class Number>
     std::vector<Number> right_sides(const std::vector<Number>& lengths) const {
         std::vector<Number> sums;

@@ -121,96 +121,134 @@ std::vector<double> trapezoidal_weights(const std::vector<double>& positions) {
     return weights;
 }
 
-VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid, bool tilts) {
-    check_grid(grid);
-    const auto order = machine.chain().order();
-    std::array<std::vector<Motion>, 3> motions;
-    std::array<const std::vector<double>*, 3> positions;
-    std::array<std::vector<double>, 3> weights;
-    for (std::size_t r = 0; r < 3; ++r) {
-        positions[r] = &grid[std::size_t(index(order[r]))];
-        weights[r] = trapezoidal_weights(*positions[r]);
-        for (const double p : *positions[r])
-            motions[r].push_back(motion_of(machine.chain(), order[r], p, machine.errors().delta(order[r], p),
-                                           machine.errors().theta(order[r], p)));
-    }
-    const Index n2 = Index(motions[1].size()), n3 = Index(motions[2].size());
-    // Functional point by component, and orientation, in the frame before the second axis.
-    std::array<ArrayXXd, 3> points;
-    for (ArrayXXd& component : points) component.resize(n3, n2);
-    std::vector<Matrix3<double>> rotations(tilts ? std::size_t(n2 * n3) : 0);
-    const Vector3<double> tool = broadcast3<double>(machine.tool());
-    for (Index k = 0; k < n3; ++k) {
-        const Motion& third = motions[2][std::size_t(k)];
-        const Vector3<double> carried = move_point(third, tool).point;
-        for (Index j = 0; j < n2; ++j) {
-            const Motion& second = motions[1][std::size_t(j)];
-            const Vector3<double> point = move_point(second, carried).point;
-            points[0](k, j) = point.x, points[1](k, j) = point.y, points[2](k, j) = point.z;
-            if (tilts) rotations[std::size_t(j * n3 + k)] = second.rotation * third.rotation;
+namespace {
+
+// The poses of a machine over a grid. Axes are in the order of the chain, workpiece to tool.
+class PosesOfGrid {
+public:
+    PosesOfGrid(const Machine& machine, const GridPositions& grid, bool tilts)
+        : tool_(machine.tool()), order_(machine.chain().order()), tilts_(tilts) {
+        for (std::size_t r = 0; r < 3; ++r) {
+            positions_[r] = &grid[std::size_t(index(order_[r]))];
+            weights_[r] = trapezoidal_weights(*positions_[r]);
+            for (const double p : *positions_[r])
+                motions_[r].push_back(motion_of(machine.chain(), order_[r], p, machine.errors().delta(order_[r], p),
+                                                machine.errors().theta(order_[r], p)));
         }
+        move_by_two_axes();
     }
-    const Eigen::Map<const ArrayXd> along_third(positions[2]->data(), n3), weight(weights[2].data(), n3);
-    constexpr double infinite = std::numeric_limits<double>::infinity();
-    std::vector<Slab> slabs(motions[0].size());
-    in_blocks(Index(slabs.size()), 1, [&](Index i, Index) {
-        Slab& slab = slabs[std::size_t(i)];
+    Index slabs() const { return Index(motions_[0].size()); }
+
+    Slab slab(Index i) const {
+        Slab slab;
         slab.lowest = slab.tilt_lowest = Vector3d::Constant(infinite);
         slab.highest = slab.tilt_highest = Vector3d::Constant(-infinite);
-        Vector3d nominal = machine.tool();
-        nominal[index(order[0])] += (*positions[0])[std::size_t(i)];
-        const Motion& first = motions[0][std::size_t(i)];
-        const Vector3<double> origin = move_point(first, broadcast3<double>(Vector3d::Zero())).point;
-        const Vector3<double> rows[] = {first.rotation.row0, first.rotation.row1, first.rotation.row2};
-        const double origins[] = {origin.x, origin.y, origin.z};
-        std::array<ArrayXd, 3> e;
-        ArrayXd size2;
+        Vector3d nominal = tool_;
+        nominal[index(order_[0])] += (*positions_[0])[std::size_t(i)];
+        const Motion& first = motions_[0][std::size_t(i)];
+        const Index n2 = Index(motions_[1].size()), n3 = Index(motions_[2].size());
         for (Index j = 0; j < n2; ++j) {
-            nominal[index(order[1])] = machine.tool()[index(order[1])] + (*positions[1])[std::size_t(j)];
-            size2 = ArrayXd::Zero(n3);
-            for (int c = 0; c < 3; ++c) {
-                ArrayXd& own = e[std::size_t(c)];
-                own = rows[c].x * points[0].col(j) + rows[c].y * points[1].col(j) + rows[c].z * points[2].col(j) +
-                      (origins[c] - nominal[c]);
-                if (c == index(order[2])) own -= along_third;
-                size2 += own.square();
-                widen(slab.lowest, slab.highest, c, own.minCoeff(), own.maxCoeff());
-            }
-            slab.weighted2 += weights[1][std::size_t(j)] * (weight * size2).sum();
-            if (const double most = size2.maxCoeff(); most > slab.largest2) {
-                Index k;
-                slab.largest2 = size2.maxCoeff(&k);
-                slab.at = {j, k};
-                slab.components = {e[0][k], e[1][k], e[2][k]};
-            }
-            for (Index k = 0; tilts && k < n3; ++k) {
-                const Vector3<double> tilt = tilt_of(first.rotation, rotations[std::size_t(j * n3 + k)]);
+            nominal[index(order_[1])] = tool_[index(order_[1])] + (*positions_[1])[std::size_t(j)];
+            add_errors(first, nominal, j, slab);
+            for (Index k = 0; tilts_ && k < n3; ++k) {
+                const Vector3<double> tilt = tilt_of(first.rotation, rotations_[std::size_t(j * n3 + k)]);
                 widen(slab.tilt_lowest, slab.tilt_highest, 0, tilt.x, tilt.x);
                 widen(slab.tilt_lowest, slab.tilt_highest, 1, tilt.y, tilt.y);
                 widen(slab.tilt_lowest, slab.tilt_highest, 2, tilt.z, tilt.z);
             }
         }
-    });
-    VolumeSummary summary;
-    summary.lowest = summary.tilt_lowest = Vector3d::Constant(infinite);
-    summary.highest = summary.tilt_highest = Vector3d::Constant(-infinite);
-    double largest2 = -1.0, mean2 = 0.0;
-    for (std::size_t i = 0; i < slabs.size(); ++i) {
-        const Slab& slab = slabs[i];
-        mean2 += weights[0][i] * slab.weighted2;
-        summary.lowest = summary.lowest.cwiseMin(slab.lowest);
-        summary.highest = summary.highest.cwiseMax(slab.highest);
-        summary.tilt_lowest = summary.tilt_lowest.cwiseMin(slab.tilt_lowest);
-        summary.tilt_highest = summary.tilt_highest.cwiseMax(slab.tilt_highest);
-        if (!(slab.largest2 > largest2)) continue;
-        largest2 = slab.largest2;
-        summary.components = slab.components;
-        summary.largest_at[index(order[0])] = (*positions[0])[i];
-        for (std::size_t r : {1, 2}) summary.largest_at[index(order[r])] = (*positions[r])[std::size_t(slab.at[r - 1])];
+        return slab;
     }
-    summary.largest = std::sqrt(largest2);
-    summary.rms = std::sqrt(mean2);
-    return summary;
+
+    VolumeSummary summary(const std::vector<Slab>& slabs) const {
+        VolumeSummary summary;
+        summary.lowest = summary.tilt_lowest = Vector3d::Constant(infinite);
+        summary.highest = summary.tilt_highest = Vector3d::Constant(-infinite);
+        double largest2 = -1.0, mean2 = 0.0;
+        for (std::size_t i = 0; i < slabs.size(); ++i) {
+            const Slab& slab = slabs[i];
+            mean2 += weights_[0][i] * slab.weighted2;
+            summary.lowest = summary.lowest.cwiseMin(slab.lowest);
+            summary.highest = summary.highest.cwiseMax(slab.highest);
+            summary.tilt_lowest = summary.tilt_lowest.cwiseMin(slab.tilt_lowest);
+            summary.tilt_highest = summary.tilt_highest.cwiseMax(slab.tilt_highest);
+            if (!(slab.largest2 > largest2)) continue;
+            largest2 = slab.largest2;
+            summary.components = slab.components;
+            summary.largest_at[index(order_[0])] = (*positions_[0])[i];
+            for (std::size_t r : {1, 2})
+                summary.largest_at[index(order_[r])] = (*positions_[r])[std::size_t(slab.at[r - 1])];
+        }
+        summary.largest = std::sqrt(largest2);
+        summary.rms = std::sqrt(mean2);
+        return summary;
+    }
+
+private:
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+
+    // Functional point by component, and orientation, in the frame before the second axis.
+    void move_by_two_axes() {
+        const Index n2 = Index(motions_[1].size()), n3 = Index(motions_[2].size());
+        for (ArrayXXd& component : points_) component.resize(n3, n2);
+        if (tilts_) rotations_.resize(std::size_t(n2 * n3));
+        const Vector3<double> tool = broadcast3<double>(tool_);
+        for (Index k = 0; k < n3; ++k) {
+            const Motion& third = motions_[2][std::size_t(k)];
+            const Vector3<double> carried = move_point(third, tool).point;
+            for (Index j = 0; j < n2; ++j) {
+                const Motion& second = motions_[1][std::size_t(j)];
+                const Vector3<double> point = move_point(second, carried).point;
+                points_[0](k, j) = point.x, points_[1](k, j) = point.y, points_[2](k, j) = point.z;
+                if (tilts_) rotations_[std::size_t(j * n3 + k)] = second.rotation * third.rotation;
+            }
+        }
+    }
+
+    // Those at all positions of the third axis, at position j of the second.
+    void add_errors(const Motion& first, const Vector3d& nominal, Index j, Slab& slab) const {
+        const Index n3 = Index(motions_[2].size());
+        const Eigen::Map<const ArrayXd> along_third(positions_[2]->data(), n3), weight(weights_[2].data(), n3);
+        const Vector3<double> origin = move_point(first, broadcast3<double>(Vector3d::Zero())).point;
+        const Vector3<double> rows[] = {first.rotation.row0, first.rotation.row1, first.rotation.row2};
+        const double origins[] = {origin.x, origin.y, origin.z};
+        std::array<ArrayXd, 3> e;
+        ArrayXd size2 = ArrayXd::Zero(n3);
+        for (int c = 0; c < 3; ++c) {
+            ArrayXd& own = e[std::size_t(c)];
+            own = rows[c].x * points_[0].col(j) + rows[c].y * points_[1].col(j) + rows[c].z * points_[2].col(j) +
+                  (origins[c] - nominal[c]);
+            if (c == index(order_[2])) own -= along_third;
+            size2 += own.square();
+            widen(slab.lowest, slab.highest, c, own.minCoeff(), own.maxCoeff());
+        }
+        slab.weighted2 += weights_[1][std::size_t(j)] * (weight * size2).sum();
+        if (const double most = size2.maxCoeff(); most > slab.largest2) {
+            Index k;
+            slab.largest2 = size2.maxCoeff(&k);
+            slab.at = {j, k};
+            slab.components = {e[0][k], e[1][k], e[2][k]};
+        }
+    }
+
+    Vector3d tool_;
+    std::array<Axis, 3> order_;
+    bool tilts_;
+    std::array<const std::vector<double>*, 3> positions_;
+    std::array<std::vector<double>, 3> weights_;
+    std::array<std::vector<Motion>, 3> motions_;
+    std::array<ArrayXXd, 3> points_;
+    std::vector<Matrix3<double>> rotations_;
+};
+
+}  // namespace
+
+VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid, bool tilts) {
+    check_grid(grid);
+    const PosesOfGrid poses(machine, grid, tilts);
+    std::vector<Slab> slabs(std::size_t(poses.slabs()));
+    in_blocks(poses.slabs(), 1, [&](Index i, Index) { slabs[std::size_t(i)] = poses.slab(i); });
+    return poses.summary(slabs);
 }
 
 SixRows errors_at(const Machine& machine, const PointRows& points) {

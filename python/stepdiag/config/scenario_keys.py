@@ -109,8 +109,8 @@ class MachineErrorsKeys(Section):
     )
     drift_um_per_h: Triple = key(
         "three drifts in µm/h",
-        "Of the functional point along X, Y, Z since the run's first reading, which no temperature of a scale explains; "
-        "needs `plan.seconds_per_reading`.",
+        "Of the functional point along X, Y, Z since the run's first reading, which no temperature of a scale "
+        "explains; needs `plan.seconds_per_reading`.",
         (0.0, 0.0, 0.0),
     )
     random: RandomSection | None = Field(
