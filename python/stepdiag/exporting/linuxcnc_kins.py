@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Calibration, Compensator
+from stepdiag.calibration.parts import parts_of
 from stepdiag.exporting.common import FloatArray, origin_of, require, temperature_row, tool_of, words
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of
@@ -74,32 +75,4 @@ def _csv_text(calibration: Calibration) -> str:
 def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
     if np.array_equal(tool, calibration.tool):
         return calibration
-    return Calibration(
-        calibration.method,
-        calibration.chain,
-        calibration.volume,
-        tool,
-        calibration.functions,
-        calibration.squareness,
-        undetermined_slopes=calibration.undetermined_slopes,
-        undetermined=calibration.undetermined,
-        reversal=calibration.reversal,
-        reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},
-        undetermined_reversal_constants=calibration.undetermined_reversal_constants,
-        date=calibration.date,
-        fit=calibration.fit,
-        variance_factor=calibration.variance_factor,
-        fit_codes=calibration.fit_codes,
-        fit_reasons=calibration.fit_reasons,
-        unseen_faults=calibration.unseen_faults,
-        conditions=calibration.conditions,
-        budget=calibration.budget,
-        uncertainty_scaled=calibration.uncertainty_scaled,
-        between_nodes=calibration.between_nodes,
-        temperature_reference=calibration.temperature_reference,
-        temperature_as_found=calibration.temperature_as_found,
-        expansion=calibration.expansion,
-        fixed_point=calibration.fixed_point,
-        unverified=calibration.unverified,
-        provenance=calibration.provenance,
-    )
+    return Calibration(**{**parts_of(calibration), "tool": tool})

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
+from stepdiag.calibration.parts import parts_of
 from stepdiag.exporting.common import tool_of
 from stepdiag.exporting.csv_grid import csv_grid
 from stepdiag.exporting.isg import isg
@@ -54,31 +55,10 @@ def read_what_is_exported(path: Path) -> Calibration:
         return calibration
     edges = dict(zip(AXES, calibration.volume, strict=True))
     nothing = {name: (np.array([0.0, edges[name[2]]]), np.zeros(2), np.full(2, np.nan)) for name in FUNCTIONS}
-    return Calibration(
-        calibration.method,
-        calibration.chain,
-        calibration.volume,
-        calibration.tool,
-        nothing | calibration.functions,
-        dict.fromkeys(SQUARENESSES, (0.0, np.nan)) | calibration.squareness,
-        reversal=calibration.reversal,
-        reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},
-        date=calibration.date,
-        fit=calibration.fit,
-        variance_factor=calibration.variance_factor,
-        fit_codes=calibration.fit_codes,
-        fit_reasons=calibration.fit_reasons,
-        unseen_faults=calibration.unseen_faults,
-        conditions=calibration.conditions,
-        budget=calibration.budget,
-        uncertainty_scaled=calibration.uncertainty_scaled,
-        between_nodes=calibration.between_nodes,
-        temperature_reference=calibration.temperature_reference,
-        temperature_as_found=calibration.temperature_as_found,
-        expansion=calibration.expansion,
-        fixed_point=calibration.fixed_point,
-        unverified=calibration.unverified,
-    )
+    parts = parts_of(calibration)
+    parts["functions"] = nothing | parts["functions"]
+    parts["squareness"] = dict.fromkeys(SQUARENESSES, (0.0, np.nan)) | parts["squareness"]
+    return Calibration(**parts)
 
 
 def check_fit(calibration: Calibration, name: str, accept_rejected: bool) -> None:

@@ -12,8 +12,8 @@ class FoundMistake:
     text, edit: what happened, and what to change; without a full stop.
     fit, variance_factor: verdict of the adjustment with the mistake undone.
     variance_factor_before: with it; None where the readings could not be adjusted.
-    alternatives: of the first of a list: how many more there are that the readings do not distinguish from it, and that are
-    not in the list.
+    alternatives: of the first of a list: how many more there are that the readings do not distinguish from it, and
+    that are not in the list.
     or_faults: the faults of readings that the adjustment found explain as much, and are as likely: they are few, on few
     lines, and the mistake has a number that was chosen for the fit, as they have."""
 

@@ -107,7 +107,9 @@ class Outcome:
         return max(self.largest.get(kind, math.inf) for kind in KINDS_OF[family])
 
     def undistinguished(self, family: Family = "faults") -> int:
-        """How many kinds of faults are not distinguished from all others, or not controlled; 0 where faults do not count."""
+        """How many kinds of faults are not distinguished from all others, or not controlled.
+
+        0 where faults do not count."""
         return undistinguished(self.faults or ()) if family == "faults" else 0
 
 
@@ -214,9 +216,9 @@ def normal(candidate: Candidate) -> Candidate:
 def settings(known: Known) -> list[Candidate]:
     """All combinations of steps, repeats, returns, scale points and backward runs, with the lines of the own plan.
 
-    Backward runs are there to determine reversal errors. Where these are unknowns, the errors of the other direction are no
-    better known for them: they stay as the scenario has them. Where there are none (`reversal = false`), both are
-    tried."""
+    Backward runs are there to determine reversal errors. Where these are unknowns, the errors of the other direction
+    are no better known for them: they stay as the scenario has them. Where there are none (`reversal = false`), both
+    are tried."""
     keys, own = known.keys.plan_by_time, own_candidate(known)
     ways = [own.backward] if known.keys.adjustment.reversal else [False, True]
     points: tuple[ScalePoints, ...] = ("ends", "steps")
@@ -403,8 +405,8 @@ def with_faults(scenario: Scenario, one: Outcome) -> Outcome:
 def telling(
     scenario: Scenario, found: Sequence[Outcome], taken: Outcome, family: Family = "volume"
 ) -> tuple[Outcome, Outcome | None]:
-    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that distinguishes all
-    faults apart, both with their faults; None where none does."""
+    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that distinguishes
+    all faults, both with their faults; None where none does."""
     own = with_faults(scenario, taken)
     if own.faults and tells_all(own.faults):
         return own, own

@@ -1,0 +1,41 @@
+"""A calibration taken apart, to make another one of it."""
+
+from typing import Any
+
+from stepdiag._core import Calibration
+
+
+def parts_of(calibration: Calibration) -> dict[str, Any]:
+    """What the constructor takes to make this calibration again."""
+    return {
+        "method": calibration.method,
+        "chain": calibration.chain,
+        "volume": calibration.volume,
+        "tool": calibration.tool,
+        "functions": calibration.functions,
+        "squareness": calibration.squareness,
+        "undetermined_slopes": calibration.undetermined_slopes,
+        "undetermined": calibration.undetermined,
+        "covariance": calibration.covariance,
+        "reversal": calibration.reversal,
+        "reversal_negative_uncertainty": {
+            name: calibration.negative_functions[name][2] for name in calibration.reversal
+        },
+        "undetermined_reversal_constants": calibration.undetermined_reversal_constants,
+        "date": calibration.date,
+        "fit": calibration.fit,
+        "variance_factor": calibration.variance_factor,
+        "fit_codes": calibration.fit_codes,
+        "fit_reasons": calibration.fit_reasons,
+        "unseen_faults": calibration.unseen_faults,
+        "conditions": calibration.conditions,
+        "budget": calibration.budget,
+        "uncertainty_scaled": calibration.uncertainty_scaled,
+        "between_nodes": calibration.between_nodes,
+        "temperature_reference": calibration.temperature_reference,
+        "temperature_as_found": calibration.temperature_as_found,
+        "expansion": calibration.expansion,
+        "fixed_point": calibration.fixed_point,
+        "unverified": calibration.unverified,
+        "provenance": calibration.provenance,
+    }
