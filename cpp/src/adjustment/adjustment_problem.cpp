@@ -8,9 +8,9 @@
 
 #include "adjustment/setup_priors.hpp"
 #include "evaluation/measurement_rows.hpp"
+#include "measurement/records.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/measurement/reading.hpp"
-#include "stepdiag/measurement/records.hpp"
 
 namespace stepdiag {
 namespace {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stepdiag/core/dual.hpp"
+#include "core/dual.hpp"
 
 // Such text stands in STEPDIAG_NAMESPACE. After Highway that is the namespace of an instruction set: the text is then
 // compiled anew for each, hence its guards. Elsewhere, and where there is no Highway, it is plain C++.

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "evaluation/measurement_rows.hpp"
+#include "measurement/records.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/measurement/records.hpp"
 
 namespace stepdiag {
 namespace {

@@ -1,8 +1,8 @@
 #include <cmath>
 
+#include "measurement/records.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/evaluation/evaluation.hpp"
-#include "stepdiag/measurement/records.hpp"
 
 namespace stepdiag {
 

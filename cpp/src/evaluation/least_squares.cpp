@@ -1,4 +1,4 @@
-#include "stepdiag/evaluation/least_squares.hpp"
+#include "evaluation/least_squares.hpp"
 
 #include <Eigen/QR>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <map>
 
 #include "evaluation/measurement_rows.hpp"
+#include "measurement/records.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/measurement/records.hpp"
 
 namespace stepdiag {
 namespace {

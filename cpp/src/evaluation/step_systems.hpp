@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "evaluation/least_squares.hpp"
 #include "evaluation/passes.hpp"
-#include "stepdiag/evaluation/least_squares.hpp"
 #include "stepdiag/evaluation/undetermined.hpp"
 
 namespace stepdiag {

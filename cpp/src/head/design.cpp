@@ -7,9 +7,9 @@
 #include <sstream>
 
 #include "head/assembly.hpp"
+#include "optics/separation.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/head/nominal_head.hpp"
-#include "stepdiag/optics/separation.hpp"
 
 namespace stepdiag {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stepdiag/optics/separation.hpp"
+#include "optics/separation.hpp"
 
 namespace stepdiag {
 namespace {

@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "head/assembly.hpp"
+#include "optics/replay_derivative.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/head/nominal_head.hpp"
 #include "stepdiag/head/traced_reading.hpp"
 #include "stepdiag/measurement/reading.hpp"
-#include "stepdiag/optics/replay_derivative.hpp"
 
 namespace stepdiag {
 namespace {

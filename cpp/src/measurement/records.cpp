@@ -1,4 +1,4 @@
-#include "stepdiag/measurement/records.hpp"
+#include "measurement/records.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "stepdiag/optics/separation.hpp"
+#include "optics/separation.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

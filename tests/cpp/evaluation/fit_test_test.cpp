@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <limits>
 
-#include "stepdiag/evaluation/least_squares.hpp"
+#include "evaluation/least_squares.hpp"
 
 namespace {
 

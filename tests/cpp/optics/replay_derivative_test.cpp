@@ -1,4 +1,4 @@
-#include "stepdiag/optics/replay_derivative.hpp"
+#include "optics/replay_derivative.hpp"
 
 #include <gtest/gtest.h>
 

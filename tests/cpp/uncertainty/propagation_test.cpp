@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "stepdiag/evaluation/least_squares.hpp"
+#include "evaluation/least_squares.hpp"
 #include "support/refuses.hpp"
 
 namespace {

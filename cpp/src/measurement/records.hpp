@@ -1,7 +1,7 @@
 // What a run records beside its readings: temperatures of the axes' scales (channels temperature_x, temperature_y and
 // temperature_z, or temperature alone, one sensor for all three), and the air (air_temperature, air_pressure,
 // air_humidity). A field that is empty is interpolated in time within its pass, the readings of one line in one run (in
-// the order of rows where a time is not known), with the nearest value at the ends.
+// the order of rows where a time is not known), with the nearest value at the ends. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
 // Dual number: a value and its derivative with respect to one parameter, with
 // (a + a' e)(b + b' e) = ab + (a'b + ab') e and e^2 = 0. Calculations with dual numbers give exact derivatives
-// (forward-mode automatic differentiation). Comparisons use the values only.
+// (forward-mode automatic differentiation). Comparisons use the values only. Internal: not installed.
 #pragma once
 
 #include <cmath>

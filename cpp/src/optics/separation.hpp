@@ -1,4 +1,4 @@
-// Distance between bodies.
+// Distance between bodies. Internal: not installed.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,6 @@
 // Weighted linear least squares by pseudoinverse (eq. 5 of the paper, with weights) that says what it can determine.
 //   x = A+ b,  A+ = (A^T W A)^-1 A^T W where A has full rank, W = diag(1/u^2);  Cov(x) = A+ Cov(b) A+^T (eq. 6)
+// Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>

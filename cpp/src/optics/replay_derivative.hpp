@@ -2,6 +2,7 @@
 // numbers (dual.hpp). A parameter may move faces rigidly, change refractive indices, and move the source. For a face
 // with local = R x + t that rotates by `rotation` about `about` and moves by `shift`:
 //   R' = -R [rotation]x,   t' = R (rotation x about - shift)
+// Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "stepdiag/core/dual.hpp"
+#include "core/dual.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 #include "stepdiag/optics/scene.hpp"
