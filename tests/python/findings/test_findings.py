@@ -1,5 +1,6 @@
 """What the readings leave open: records of the core, and the one text that is made of them."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from calibrations import PLAN, TOOL, VOLUME, simulate
 from usual import CHAIN, DIAGONALS
 
 import stepdiag as sd
+from stepdiag import _core
 from stepdiag.findings.error_map import frame_deviation_texts
 from stepdiag.findings.undetermined import REASONS, REMEDIES, combination_text, undetermined_text
 
@@ -93,3 +95,23 @@ def test_where_an_error_map_breaks_the_frame_choice_is_said_in_units_of_reports(
         "EYX is 2 µm at the end of travel",
         "EAX is 3 µrad at home",
     ]
+
+
+def test_refusal_keeps_its_words_when_it_is_pickled() -> None:
+    """As where a worker raises it."""
+    run = simulate(1)
+    with pytest.raises(sd.InvalidArgument) as refusal:
+        sd.methods.evaluate(without(run, list(run.point % 3 != 0)), PLAN, sd.Head(), CHAIN, TOOL, method="conventional")
+    again = pickle.loads(pickle.dumps(refusal.value))
+    assert type(again) is sd.InvalidArgument
+    assert str(again) == str(refusal.value)
+
+
+def test_core_gives_data_and_takes_no_function_that_words_them() -> None:
+    """But for calls with wrong arguments, which are refused before anything is found."""
+    assert [name for name in dir(_core) if name.startswith("word_")] == ["word_wrong_arguments_with"]
+    bare = _core.adjust(simulate(1, plan=NO_SCALE_LINES), NO_SCALE_LINES, sd.Head(), CHAIN, TOOL)
+    assert bare.calibration.undetermined == bare.calibration.fit_reasons == []
+    worded = sd.methods.adjust(simulate(1, plan=NO_SCALE_LINES), NO_SCALE_LINES, sd.Head(), CHAIN, TOOL)
+    assert worded.calibration.undetermined == [undetermined_text(one) for one in bare.calibration.findings] != []
+    assert worded.calibration.fit_codes == bare.calibration.fit_codes
