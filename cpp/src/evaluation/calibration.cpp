@@ -301,6 +301,30 @@ void write_calibration(const Calibration& calibration, const std::string& path) 
     write_parameter_table(to_parameter_table(calibration), path);
 }
 
+namespace {
+
+// The tables of a file.
+void take_values(const ParameterTable& table, const std::string& path, Calibration& calibration) {
+    const auto slopes = functions_listed(table, "undetermined_slopes", path);
+    const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
+    for (int i = 0; i < function_count; ++i) {
+        if (!table.functions[i]) continue;
+        const std::string name = FunctionId::at(i).name();
+        const FunctionTable& source = *table.functions[i];
+        calibration.functions[i] = CalibratedFunction{source.position, source.value,
+                                                      or_unknown(source.standard_uncertainty), slopes.count(name) == 0};
+        if (!table.negative_functions[i]) continue;
+        calibration.reversal[i] = reversal_of(source, *table.negative_functions[i]);
+        calibration.reversal[i]->constant_determined = constants.count(name) == 0;
+    }
+    for (int i = 0; i < squareness_count; ++i)
+        if (const auto& entry = table.squarenesses[i])
+            calibration.squarenesses[i] =
+                CalibratedSquareness{entry->value, entry->standard_uncertainty.value_or(unknown)};
+}
+
+}  // namespace
+
 Calibration read_calibration(const std::string& path) {
     const ParameterTable table = ErrorMap(read_parameter_table(path)).table();
     const auto optional_value = [&](const char* key) {
@@ -343,22 +367,7 @@ Calibration read_calibration(const std::string& path) {
         calibration.expansion = expansion->coefficient;
         calibration.fixed_point = expansion->fixed_point;
     }
-    const auto slopes = functions_listed(table, "undetermined_slopes", path);
-    const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
-    for (int i = 0; i < function_count; ++i) {
-        if (!table.functions[i]) continue;
-        const std::string name = FunctionId::at(i).name();
-        const FunctionTable& source = *table.functions[i];
-        calibration.functions[i] = CalibratedFunction{source.position, source.value,
-                                                      or_unknown(source.standard_uncertainty), slopes.count(name) == 0};
-        if (!table.negative_functions[i]) continue;
-        calibration.reversal[i] = reversal_of(source, *table.negative_functions[i]);
-        calibration.reversal[i]->constant_determined = constants.count(name) == 0;
-    }
-    for (int i = 0; i < squareness_count; ++i)
-        if (const auto& entry = table.squarenesses[i])
-            calibration.squarenesses[i] =
-                CalibratedSquareness{entry->value, entry->standard_uncertainty.value_or(unknown)};
+    take_values(table, path, calibration);
     if (!(calibration.volume.minCoeff() > 0.0))
         throw InvalidArgument(path + ": volume_mm: expected three positive edges");
     return calibration;

@@ -105,6 +105,28 @@ void Prediction::collect_rows() {
     }
 }
 
+namespace {
+
+// By coefficient and sensor: what they add to axis a along itself, by z.
+Eigen::VectorXd added_by_expansion(const AdjustmentProblem& problem, const AdjustedPoint& point, int a,
+                                   Eigen::Index size) {
+    Eigen::VectorXd added = Eigen::VectorXd::Zero(size);
+    const auto& coefficients = problem.coefficients();
+    const auto& expansion = problem.expansion();
+    if (!expansion) return added;
+    for (std::size_t c = 0; c < coefficients.size(); ++c)
+        for (const int of : coefficients[c].axes)
+            if (of == a) added[Eigen::Index(c)] = coefficients[c].prior * coefficients[c].effect(point.place, a);
+    for (std::size_t s = 0; s < problem.sensors().size(); ++s)
+        for (const int of : problem.sensors()[s])
+            if (of == a)
+                added[Eigen::Index(coefficients.size() + s)] =
+                    expansion->expansion.coefficient[a] * expansion->sensor_uncertainty * point.place.from_fixed[a];
+    return added;
+}
+
+}  // namespace
+
 void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool derivatives) {
     const std::size_t k = std::size_t(&rows - setups_.data());
     const LineSetup& setup = problem_.setups()[k];
@@ -114,7 +136,6 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
     model.set_up(whole);
 
     const Eigen::Index columns = root_.cols();
-    const auto& coefficients = problem_.coefficients();
     const auto& expansion = problem_.expansion();
     const Eigen::VectorXd values = root_ * z.head(columns);
     Eigen::RowVectorXd row(z.size());
@@ -130,7 +151,6 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
     for (const int p : rows.points) {
         const AdjustedPoint& point = problem_.points()[p];
         MachineErrors errors;
-        // By coefficient and sensor: what they add to an axis along itself, by z.
         std::array<Eigen::VectorXd, 3> added;
         for (const Axis axis : all_axes) {
             const int a = index(axis);
@@ -139,19 +159,9 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             errors[a] = baseline_.errors(axis, position, point.negative[a], shares[a]);
             for (const Baseline::Share& share : shares[a])
                 errors[a][share.component] += share.weight * values[share.entry];
-            added[a].setZero(z.size() - columns);
+            added[a] = added_by_expansion(problem_, point, a, z.size() - columns);
             if (!expansion) continue;
             errors[a][a] += expansion->expansion.coefficient[a] * point.place.stretch[a];
-            for (std::size_t c = 0; c < coefficients.size(); ++c)
-                for (const int of : coefficients[c].axes)
-                    if (of == a)
-                        added[a][Eigen::Index(c)] = coefficients[c].prior * coefficients[c].effect(point.place, a);
-            for (std::size_t s = 0; s < problem_.sensors().size(); ++s)
-                for (const int of : problem_.sensors()[s])
-                    if (of == a)
-                        added[a][Eigen::Index(coefficients.size() + s)] = expansion->expansion.coefficient[a] *
-                                                                          expansion->sensor_uncertainty *
-                                                                          point.place.from_fixed[a];
             errors[a][a] += added[a].dot(z.tail(added[a].size()));
         }
         const PoseDerivative pose =

@@ -265,6 +265,27 @@ constexpr double no_index = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
+namespace {
+
+SimdFace nominal_face(const BeamPath& path, std::size_t encounter) {
+    const RecordedEncounter& met = path.route.encounters[encounter];
+    const FaceFrame frame = path.unfolding(encounter).of(path.frames[std::size_t(met.face)]);
+    SimdFace face{met.event,
+                  met.index_before != met.index_after,
+                  &path.outlines[std::size_t(met.face)],
+                  {},
+                  met.index_before,
+                  met.index_after};
+    std::copy_n(frame.rotation.data(), 9, face.plane);
+    std::copy_n(frame.translation.data(), 3, face.plane + 9);
+    face.inverse_index = 1.0 / face.index_before;
+    face.index_ratio = face.index_before / face.index_after;
+    face.one_less_ratio2 = 1.0 - face.index_ratio * face.index_ratio;
+    return face;
+}
+
+}  // namespace
+
 void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) const {
     const Head& head = *paths.head;
     if (!head.design) {
@@ -284,8 +305,8 @@ void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) co
         return taken;
     };
     const auto new_beam = [&](SimdDetector detector, int channel) -> SimdBeam& {
-        SimdBeam beam{};
         SimdRow* const rows = take(rows_of_a_beam);
+        SimdBeam& beam = to.beams.emplace_back();
         beam.source = rows;
         beam.air = rows + 6;
         beam.offset = rows + 7;
@@ -293,8 +314,7 @@ void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) co
         beam.detector = detector;
         beam.channel = channel;
         beam.scale = 0.5 / refractive_index(model_.assumed(head), head.wavelength);
-        to.beams.push_back(std::move(beam));
-        return to.beams.back();
+        return beam;
     };
     const bool by_lane = model_.has_uncertain_air() || !paths.moved.empty();
     for (const BeamPath& path : paths.beams) {
@@ -316,18 +336,7 @@ void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) co
         for (std::size_t e = 0; e < path.route.encounters.size(); ++e) {
             if (!path.is_alone(e)) continue;
             const RecordedEncounter& met = path.route.encounters[e];
-            const FaceFrame frame = path.unfolding(e).of(path.frames[std::size_t(met.face)]);
-            SimdFace face{met.event,
-                          met.index_before != met.index_after,
-                          &path.outlines[std::size_t(met.face)],
-                          {},
-                          met.index_before,
-                          met.index_after};
-            std::copy_n(frame.rotation.data(), 9, face.plane);
-            std::copy_n(frame.translation.data(), 3, face.plane + 9);
-            face.inverse_index = 1.0 / face.index_before;
-            face.index_ratio = face.index_before / face.index_after;
-            face.one_less_ratio2 = 1.0 - face.index_ratio * face.index_ratio;
+            SimdFace face = nominal_face(path, e);
             if (by_lane) {
                 SimdRow* const rows = take(rows_of_a_face);
                 fill(face.plane, 12, rows);
