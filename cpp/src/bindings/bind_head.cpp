@@ -552,7 +552,6 @@ static void bind_head_calibration(py::module_& m) {
                 offsets.row(Eigen::Index(i)) = c.beam_offsets[i].transpose();
             return to_numpy(offsets);
         });
-
 }
 
 static void bind_design(py::module_& m) {

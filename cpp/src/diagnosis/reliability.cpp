@@ -138,8 +138,8 @@ private:
         }
         if (has_twin) ++control.twins;
         else
-            control.distinguished_from =
-                std::max(control.distinguished_from, noise_ * std::sqrt(thresholds.alternative / (1.0 - nearest * nearest)) * u);
+            control.distinguished_from = std::max(
+                control.distinguished_from, noise_ * std::sqrt(thresholds.alternative / (1.0 - nearest * nearest)) * u);
     }
 
     // Of any size. It does no harm where it is a constant that the set-up takes up.

@@ -10,7 +10,8 @@ std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& ex
                                         const std::vector<DriftEstimate>& machine_drift);
 
 // From what the adjustment found, its own verdict not counted, the patterns of its residuals, and the set-up quantities
-// that scatter more than their priors. `residual_rounding`: rms of the residuals, each in units of its rounding (adjustment/channel_model.hpp).
+// that scatter more than their priors. `residual_rounding`: rms of the residuals, each in units of its rounding
+// (adjustment/channel_model.hpp).
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
               const std::vector<ResidualPattern>& prior_scatter, double residual_rounding);
 

@@ -187,8 +187,7 @@ TEST(Adjustment, WeighsAChannelThatScattersMoreThanStated) {
     EXPECT_EQ(result.verdict.reasons.front().finding, stepdiag::FitFinding::noise_factor);
     EXPECT_EQ(result.calibration.fit_codes, std::vector<std::string>{"noise_factor"});
     const auto judged = stepdiag::judge(result, {"a shifted row", {"air of 80 °C"}});
-    EXPECT_EQ(judged.calibration.fit_codes,
-              (std::vector<std::string>{"mistake", "noise_factor", "implausible_input"}));
+    EXPECT_EQ(judged.calibration.fit_codes, (std::vector<std::string>{"mistake", "noise_factor", "implausible_input"}));
     EXPECT_TRUE(result.faults.empty());
     for (const stepdiag::VarianceComponent& each : result.variance_components) {
         const double simulated = each.noise.channel == "distance" ? 20.0 : 1.0;  // of 0.1 um

@@ -138,10 +138,10 @@ ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, date, unverified, fit, variance_factor, uncertainty_scaled,
 // between_nodes_mm, temperature_reference_c with expansion_per_k and fixed_point_mm, or temperature_as_found_c,
-// fit_codes, fit_reasons, unseen_faults, conditions, budget, straightness_reference, provenance_keys, undetermined_slopes,
-// undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
-// uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
-// line, also where chain, volume or tool is missing.
+// fit_codes, fit_reasons, unseen_faults, conditions, budget, straightness_reference, provenance_keys,
+// undetermined_slopes, undetermined_reversal_constants and undetermined in the leading lines; not kept are the
+// covariance and the uncertainty of a reversal error, which is not that of its two tables. Reading throws
+// InvalidArgument naming file and line, also where chain, volume or tool is missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);
 
