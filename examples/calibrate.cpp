@@ -1,8 +1,8 @@
 // Adjusts a measured run and prints the machine's error at the far corner: what a controller would correct there.
 #include <cstdio>
+#include <stepdiag/diagnosis/adjust.hpp>
 #include <stepdiag/core/error.hpp>
 #include <stepdiag/core/units.hpp>
-#include <stepdiag/diagnosis/adjust.hpp>
 #include <stepdiag/machine/machine.hpp>
 
 int main(int count, char** arguments) try {
