@@ -85,12 +85,7 @@ def acquire(
     known, options, operator = scenario.known, options or AcquireOptions(), operator or Silent()
     try:
         instrument = instrument_of(source, known, options, operator.tell)
-        check_output(output)
-        path = raw or raw_path(output)
-        if path.resolve() == output.resolve():
-            raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
-        if output.exists() and not path.exists():
-            raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
+        path = _checked_raw_path(raw, output)
         followed = None
         if temperatures is not None:
             followed = TemperatureFile(temperatures, age=options.temperature_age, tell=operator.tell)
@@ -135,6 +130,17 @@ def acquire(
         trigger.close()
     lost = sum(1 for reading in work.done.values() if reading.is_lost)
     return Acquired(path, output, len(work.done), lost, sum(len(visit.points) for visit in plan))
+
+
+def _checked_raw_path(raw: Path | None, output: Path) -> Path:
+    """The path of the raw file. Raises InvalidArgument where the acquisition would overwrite a file."""
+    check_output(output)
+    path = raw or raw_path(output)
+    if path.resolve() == output.resolve():
+        raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
+    if output.exists() and not path.exists():
+        raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
+    return path
 
 
 def instrument_of(source: str, known: Known, options: AcquireOptions, warn: Callable[[str], None]) -> Instrument:

@@ -165,7 +165,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     found and distinguished, and how the largest uncertainties grow with the number of steps.
     """
     from stepdiag.io.whole_files import write_whole
-    from stepdiag.planning.fault_control import extensions, tells_all
+    from stepdiag.planning.fault_control import distinguishes_all, extensions
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
     from stepdiag.presentation.blocks import text_of
     from stepdiag.presentation.fault_control import control_blocks, extension_blocks
@@ -182,7 +182,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
         for line in text_of([*observation_blocks(found, run, known), *control_blocks(found.reliability)]):
             say(line)
     with Progress("larger plans"):
-        tried = [] if tells_all(found.reliability) else list(extensions(known))
+        tried = [] if distinguishes_all(found.reliability) else list(extensions(known))
     if not as_json:
         for line in text_of(extension_blocks(found.reliability, tried)):
             say(line)

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -12,6 +12,12 @@ from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress
 from stepdiag.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from stepdiag.config.plan_by_time_keys import PlanByTimeSection
+    from stepdiag.planning.plan_by_time import Aim, Outcome
+    from stepdiag.scenario.description import Scenario
+    from stepdiag.scenario.known import Known
 
 Family = Literal["volume", "length", "angle", "squareness", "faults"]
 
@@ -140,28 +146,8 @@ def plan(
         _plan_recheck(scenario, baseline, minutes, limit, output)
         return
     from stepdiag.io.whole_files import check_input, write_whole
-    from stepdiag.planning.best_plan import best_plans
-    from stepdiag.planning.plan_by_time import (
-        aim_of,
-        choose,
-        deciding_goal,
-        own_candidate,
-        squareness_goal,
-        telling,
-        volume_goal,
-        with_faults,
-    )
-    from stepdiag.presentation.plan_by_time import (
-        advice,
-        fault_advice,
-        inputs_row,
-        left_out_rows,
-        line_names,
-        own_row,
-        plan_csv,
-        plan_rows,
-        shown,
-    )
+    from stepdiag.planning.plan_by_time import aim_of, deciding_goal, squareness_goal, volume_goal
+    from stepdiag.presentation.plan_by_time import plan_csv
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
@@ -172,54 +158,86 @@ def plan(
         inputs.append(measured)
     tell_inputs(described)
     path = None if output is None else output.claim(*inputs, error_map=described.truth.error_map)
-    times = None
-    if measured is not None:
-        from stepdiag.acquisition.times_of_run import key_rows, measured_times
-
-        taken_from = measured_times(measured, known.keys.plan_by_time, f"{known.path}: plan_by_time")
-        times = taken_from.keys
-        for row in key_rows(taken_from):
-            say(row)
     goals = [
         *([volume_goal(volume_u)] if volume_u is not None else []),
         *([squareness_goal(squareness_u)] if squareness_u is not None else []),
         *([deciding_goal(decide, known.between_nodes)] if decide is not None else []),
     ]
+    times = None if measured is None else _times_of(measured, known)
     aim = aim_of(known, minutes=minutes, spacing=spacing, family=family, goals=goals)
-    with Progress("plans") as progress:
-        found = best_plans(described, aim, times=times, progress=progress)
-    choice = choose(found, aim)
-    rows = shown(found, choice, aim)
-    with Progress("faults of the plans in the table") as progress:
-        for done, one in enumerate(rows, 1):
-            if one.minutes <= aim.minutes:
-                tested = with_faults(described, one)
-                found = [tested if other is one else other for other in found]
-            progress(done, len(rows))
-    choice = choose(found, aim)
-    say(inputs_row(known))
-    say("largest standard uncertainties by measuring time, for a machine with usual errors (lines: body diagonals/face")
-    say("diagonals/single axes/scale lines; found: smallest wrong distance that is found; kinds: kinds of faults")
-    say("that are distinguished):")
-    for line in plan_rows(shown(found, choice, aim), choice, aim):
-        say(line)
-    own = own_candidate(known)
-    own_rows = [own_row(one) for one in found if one.candidate == own]
-    for line in [*left_out_rows(found), *own_rows, *advice(found, aim)]:
-        say(line)
-    if choice.taken is not None:
-        say(f"  {line_names(choice.taken)}")
-        with Progress("plans that distinguish all faults"):
-            extended = telling(described, found, choice.taken, family)
-        for line in fault_advice(*extended):
-            say(line)
+    found = _searched(described, aim, times)
+    taken = _say_choice(described, aim, found)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":
         write_whole(path, plan_csv(found, family))
     elif path is not None:
         from stepdiag.figures.plan_by_time import draw_plans
 
-        write_whole(path, draw_plans(found, choice.taken, aim.minutes, suffix))
+        write_whole(path, draw_plans(found, taken, aim.minutes, suffix))
+
+
+def _times_of(measured: Path, known: "Known") -> "PlanByTimeSection":
+    """The times that an acquisition took, shown beside those of the scenario."""
+    from stepdiag.acquisition.times_of_run import key_rows, measured_times
+
+    taken_from = measured_times(measured, known.keys.plan_by_time, f"{known.path}: plan_by_time")
+    for row in key_rows(taken_from):
+        say(row)
+    return taken_from.keys
+
+
+def _searched(described: "Scenario", aim: "Aim", times: "PlanByTimeSection | None") -> "list[Outcome]":
+    """All plans, those of the table with their faults."""
+    from stepdiag.planning.best_plan import best_plans
+    from stepdiag.planning.plan_by_time import choose, with_faults
+    from stepdiag.presentation.plan_by_time import shown
+
+    with Progress("plans") as progress:
+        found = best_plans(described, aim, times=times, progress=progress)
+    rows = shown(found, choose(found, aim), aim)
+    with Progress("faults of the plans in the table") as progress:
+        for done, one in enumerate(rows, 1):
+            if one.minutes <= aim.minutes:
+                tested = with_faults(described, one)
+                found = [tested if other is one else other for other in found]
+            progress(done, len(rows))
+    return found
+
+
+def _say_choice(described: "Scenario", aim: "Aim", found: "list[Outcome]") -> "Outcome | None":
+    """Show the table and the advice. Returns the plan that is advised."""
+    from stepdiag.planning.plan_by_time import choose, distinguishing, own_candidate
+    from stepdiag.presentation.plan_by_time import (
+        advice,
+        fault_advice,
+        inputs_row,
+        left_out_rows,
+        line_names,
+        own_row,
+        plan_rows,
+        shown,
+    )
+
+    choice = choose(found, aim)
+    own = own_candidate(described.known)
+    for line in (
+        inputs_row(described.known),
+        "largest standard uncertainties by measuring time, for a machine with usual errors (lines: body diagonals/face",
+        "diagonals/single axes/scale lines; found: smallest wrong distance that is found; kinds: kinds of faults",
+        "that are distinguished):",
+        *plan_rows(shown(found, choice, aim), choice, aim),
+        *left_out_rows(found),
+        *(own_row(one) for one in found if one.candidate == own),
+        *advice(found, aim),
+    ):
+        say(line)
+    if choice.taken is not None:
+        say(f"  {line_names(choice.taken)}")
+        with Progress("plans that distinguish all faults"):
+            extended = distinguishing(described, found, choice.taken, aim.family)
+        for line in fault_advice(*extended):
+            say(line)
+    return choice.taken
 
 
 def _plan_recheck(

@@ -182,7 +182,6 @@ def uncertainty(
     If more than 0.1 % of the virtual calibrations give no result, the command ends with a warning
     and exit code 3: its Monte Carlo figures are those of the others.
     """
-    from stepdiag.io.data_files import is_netcdf
     from stepdiag.presentation.uncertainty import input_rows, opening_rows, result_rows
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.map_warnings import scenario_warnings
@@ -206,13 +205,7 @@ def uncertainty(
         checkpoint=kept.path,
         resume=resume,
     )
-    wanted.check()
-    if (scheduler is not None or workers is not None) and not wanted.draws:
-        raise InvalidArgument("--scheduler and --workers: go with the Monte Carlo method: -n or --adaptive")
-    if checkpoint is not None and not wanted.draws:
-        raise InvalidArgument("--checkpoint: goes with the Monte Carlo method: -n or --adaptive")
-    if (covariance or keep) and (output is None or not is_netcdf(output.path)):
-        raise InvalidArgument(f"{'--covariance' if covariance else '--keep'}: expected -o with a name that ends in .nc")
+    _check(wanted, scheduler, workers, checkpoint, output)
     described = read_scenario(scenario)
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     if list_inputs:
@@ -238,6 +231,27 @@ def uncertainty(
     if result.warning is not None:
         tell("warning", result.warning)
         context.exit(NOT_TO_BE_TRUSTED)
+
+
+def _check(
+    wanted: "UncertaintyRequest",
+    scheduler: str | None,
+    workers: int | None,
+    checkpoint: OutputFile | None,
+    output: OutputFile | None,
+) -> None:
+    """Raises InvalidArgument where options do not go together."""
+    from stepdiag.io.data_files import is_netcdf
+
+    wanted.check()
+    if (scheduler is not None or workers is not None) and not wanted.draws:
+        raise InvalidArgument("--scheduler and --workers: go with the Monte Carlo method: -n or --adaptive")
+    if checkpoint is not None and not wanted.draws:
+        raise InvalidArgument("--checkpoint: goes with the Monte Carlo method: -n or --adaptive")
+    if (wanted.covariance or wanted.keep) and (output is None or not is_netcdf(output.path)):
+        raise InvalidArgument(
+            f"{'--covariance' if wanted.covariance else '--keep'}: expected -o with a name that ends in .nc"
+        )
 
 
 @contextmanager

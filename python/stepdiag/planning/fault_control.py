@@ -25,7 +25,7 @@ class Extension:
     trouble: str = ""
 
 
-def tells_all(controls: Sequence[FaultControl]) -> bool:
+def distinguishes_all(controls: Sequence[FaultControl]) -> bool:
     """Whether each fault that is found is distinguished from all others, and none is uncontrolled."""
     return not any(c.twins or c.uncontrolled for c in controls)
 

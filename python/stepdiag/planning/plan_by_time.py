@@ -18,7 +18,7 @@ from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.parameters import Kind
-from stepdiag.planning.fault_control import tells_all
+from stepdiag.planning.fault_control import distinguishes_all
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import extents, not_measured
 from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
@@ -402,20 +402,20 @@ def with_faults(scenario: Scenario, one: Outcome) -> Outcome:
     return replace(one, faults=faults or ())
 
 
-def telling(
+def distinguishing(
     scenario: Scenario, found: Sequence[Outcome], taken: Outcome, family: Family = "volume"
 ) -> tuple[Outcome, Outcome | None]:
     """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that distinguishes
     all faults, both with their faults; None where none does."""
     own = with_faults(scenario, taken)
-    if own.faults and tells_all(own.faults):
+    if own.faults and distinguishes_all(own.faults):
         return own, own
     for one in sorted(complete(found), key=_seconds):
         if one.candidate.steps != taken.candidate.steps or one is taken:
             continue
         if _hardly_worse(one, taken, "volume" if family == "faults" else family):
             tested = with_faults(scenario, one)
-            if tested.faults and tells_all(tested.faults):
+            if tested.faults and distinguishes_all(tested.faults):
                 return own, tested
     return own, None
 

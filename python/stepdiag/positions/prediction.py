@@ -100,7 +100,7 @@ def predict_positions(
     `start`, `end`: commanded positions in the volume, mm. `points`: targets at equal distances, both ends included;
     None: as many as the axis with the most nodes has. `tool`: offset, mm; None: that of the calibration. Intervals of
     ranges come from 10,000 draws of the joint normal distribution of the deviations, reflected about the value as
-    those of `volumetric_accuracy`. Raises InvalidArgument for points outside the volume, a line without length, and
+    those of `volume`. Raises InvalidArgument for points outside the volume, a line without length, and
     fewer than two targets."""
     ends = np.array([start, end], dtype=float)
     _check_line(calibration, ends)
@@ -123,29 +123,7 @@ def predict_positions(
     down = (machine.error(commanded, downward) - origin) @ direction
 
     effects = LineEffects(calibration, commanded, direction, offset)
-    reasons = []
-    missing = effects.missing()
-    if missing:
-        up[:] = np.nan
-        reasons.append(f"not predicted: {', '.join(missing)} not determined")
-    without_table, constants = effects.unknown_reversals()
-    if missing or without_table:
-        down[:] = np.nan
-    if without_table:
-        what = f"of {', '.join(without_table)}" if calibration.reversal else "(no backward lines)"
-        reasons.append(f"B, M, E↓ and the bidirectional E are not predicted: no reversal tables {what}")
-    elif constants:
-        # Tables of the - direction count upward for axes that fall along the line, and downward for the others.
-        changing = effects.changing(constants)
-        fall = {axis for axis, sign in zip(AXES, upward, strict=True) if sign == "-"}
-        figures_of = (("E↑", up, fall), ("E↓", down, set(AXES) - fall))
-        lost = [(name, values) for name, values, axes in figures_of if axes & {one[2] for one in changing}]
-        for _, values in lost:
-            values[:] = np.nan
-        reasons.append(
-            f"{', '.join(['B', 'M', *(name for name, _ in lost)])} and the bidirectional E are not predicted: "
-            f"the reversal error of {', '.join(constants)} is known but for a constant"
-        )
+    reasons, constants = _blank_unknown(calibration, effects, upward, up, down)
     reversal, u_reversal = up - down, effects.reversal_uncertainty()
     if constants:
         reversal[:] = np.nan
@@ -175,6 +153,37 @@ def predict_positions(
         {name: figures[name] for name in FIGURES if name in figures},
         tuple(reasons),
     )
+
+
+def _blank_unknown(
+    calibration: Calibration, effects: LineEffects, upward: str, up: FloatArray, down: FloatArray
+) -> tuple[list[str], list[str]]:
+    """Set deviations to NaN where the calibration does not determine them. Returns why, a sentence each, and the
+    reversal errors that are known but for a constant."""
+    reasons = []
+    missing = effects.missing()
+    if missing:
+        up[:] = np.nan
+        reasons.append(f"not predicted: {', '.join(missing)} not determined")
+    without_table, constants = effects.unknown_reversals()
+    if missing or without_table:
+        down[:] = np.nan
+    if without_table:
+        what = f"of {', '.join(without_table)}" if calibration.reversal else "(no backward lines)"
+        reasons.append(f"B, M, E↓ and the bidirectional E are not predicted: no reversal tables {what}")
+    elif constants:
+        # Tables of the - direction count upward for axes that fall along the line, and downward for the others.
+        changing = effects.changing(constants)
+        fall = {axis for axis, sign in zip(AXES, upward, strict=True) if sign == "-"}
+        figures_of = (("E↑", up, fall), ("E↓", down, set(AXES) - fall))
+        lost = [(name, values) for name, values, axes in figures_of if axes & {one[2] for one in changing}]
+        for _, values in lost:
+            values[:] = np.nan
+        reasons.append(
+            f"{', '.join(['B', 'M', *(name for name, _ in lost)])} and the bidirectional E are not predicted: "
+            f"the reversal error of {', '.join(constants)} is known but for a constant"
+        )
+    return reasons, constants
 
 
 def _check_line(calibration: Calibration, ends: FloatArray) -> None:

@@ -43,9 +43,9 @@ def control_blocks(controls: Sequence[FaultControl]) -> Iterator[Block]:
 
 def extension_blocks(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[Block]:
     """What would distinguish or control what the plan does not; nothing where it does."""
-    from stepdiag.planning.fault_control import tells_all  # reports of evaluations need none of that room
+    from stepdiag.planning.fault_control import distinguishes_all  # reports of evaluations need none of that room
 
-    if tells_all(own):
+    if distinguishes_all(own):
         return
     for extension in tried:
         if extension.trouble:

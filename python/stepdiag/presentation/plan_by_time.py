@@ -148,20 +148,19 @@ def own_row(own: Outcome) -> str:
     return f"the scenario's own plan: {_named(own)}, in {own.minutes:.1f} minutes: {_said(own)}"
 
 
-def fault_advice(taken: Outcome, telling: Outcome | None) -> Iterator[str]:
+def fault_advice(taken: Outcome, other: Outcome | None) -> Iterator[str]:
     """Whether faults of the readings are distinguished in the plan to take, and which plan would."""
-    yield f"faults distinguished in the plan to take: {_told(taken)}"
-    if telling is None:
+    yield f"faults distinguished in the plan to take: {_kinds(taken)}"
+    if other is None:
         yield "no plan of as many steps that is as certain distinguishes all faults"
-    elif telling is not taken:
-        more = telling.minutes - taken.minutes
+    elif other is not taken:
+        more = other.minutes - taken.minutes
         yield (
-            f"all faults distinguished: {_named(telling)}, in {telling.minutes:.1f} minutes ({more:+.1f}): "
-            f"{_told(telling)}"
+            f"all faults distinguished: {_named(other)}, in {other.minutes:.1f} minutes ({more:+.1f}): {_kinds(other)}"
         )
 
 
-def _told(one: Outcome) -> str:
+def _kinds(one: Outcome) -> str:
     return "; ".join(f"{name(c)} {distinguished(c)}" for c in one.faults or ()) or "none"
 
 

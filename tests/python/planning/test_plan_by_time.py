@@ -23,12 +23,12 @@ from stepdiag.planning.plan_by_time import (
     Outcome,
     choose,
     complete,
+    distinguishing,
     front,
     outcome,
     own_candidate,
     settings,
     stated_candidates,
-    telling,
 )
 from stepdiag.presentation.plan_by_time import (
     advice,
@@ -277,16 +277,16 @@ def test_plan_that_tells_faults_apart_is_named_with_its_minutes() -> None:
     scenario = parse_scenario(SCENARIO + FEW)
     lines = (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p"))
     once, twice = (outcome(scenario, Candidate(*lines, 10, repeats)) for repeats in (1, 2))
-    taken, telling_all = telling(scenario, [once, twice], once)
+    taken, distinguishing_all = distinguishing(scenario, [once, twice], once)
     assert any(c.twins for c in taken.faults)
-    assert telling_all is not None
-    assert telling_all.candidate == twice.candidate
-    assert not any(c.twins or c.uncontrolled for c in telling_all.faults)
-    said = list(fault_advice(taken, telling_all))
+    assert distinguishing_all is not None
+    assert distinguishing_all.candidate == twice.candidate
+    assert not any(c.twins or c.uncontrolled for c in distinguishing_all.faults)
+    said = list(fault_advice(taken, distinguishing_all))
     assert said[0].startswith("faults distinguished in the plan to take: wrong distance none; slip of distances none; ")
     assert f"(+{twice.minutes - once.minutes:.1f})" in said[1]
-    assert len(list(fault_advice(telling_all, telling_all))) == 1
-    assert telling(scenario, [once], once)[1] is None
+    assert len(list(fault_advice(distinguishing_all, distinguishing_all))) == 1
+    assert distinguishing(scenario, [once], once)[1] is None
     assert "no plan of as many steps" in list(fault_advice(taken, None))[1]
 
 

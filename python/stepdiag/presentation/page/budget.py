@@ -1,5 +1,6 @@
 """The uncertainty budget: which inputs make the largest uncertainty of each family, from an uncertainty result."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -125,42 +126,8 @@ def budget_section(budget: Budget | None, figures: Figures) -> Markup:
                 ),
             ),
         )
-    named = [f"{share.kind}<br>{_label(share)}" for share in budget.shares]
-    order: dict[str, float] = {}
-    for share in budget.shares:
-        for group, part in share.shares.items():
-            order[group] = max(order.get(group, 0.0), abs(part))
-    groups = [group for group, part in sorted(order.items(), key=lambda item: -item[1]) if part >= SMALL_SHARE]
-    columns = {group: [share.shares.get(group, 0.0) for share in budget.shares] for group in groups}
-    rest = [sum(part for group, part in share.shares.items() if group not in groups) for share in budget.shares]
-    if len(groups) > MOST_GROUPS:
-        for group in groups[MOST_GROUPS:]:
-            rest = [a + b for a, b in zip(rest, columns.pop(group), strict=True)]
-    if any(abs(part) >= SMALL_SHARE / 10 for part in rest):
-        columns["others"] = rest
-    bars = [
-        {
-            "type": "bar",
-            "orientation": "h",
-            "name": group,
-            "y": named,
-            "x": [100.0 * part for part in parts],
-            "marker": {"color": colour, "line": {"color": "#ffffff", "width": 1}},
-            "hovertemplate": f"{group}: %{{x:.1f}} %<extra></extra>",
-        }
-        for (group, parts), colour in zip(columns.items(), [*SERIES, GREY], strict=False)
-    ]
-    figures.add(
-        "figure-budget",
-        bars,
-        {"title": {"text": "share of the variance (%)", "standoff": 6}},
-        {"autorange": "reversed", "nticks": None, "tickfont": {"color": INK}},
-        barmode="relative",
-        hovermode="closest",
-        showlegend=True,
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0, "traceorder": "normal"},
-        margin={"l": 10, "r": 10, "t": 8, "b": 90},
-    )
+    columns = _columns(budget.shares)
+    _add_figure(budget.shares, columns, figures)
     rows = [
         [
             f"{share.kind}: {_label(share)}",
@@ -191,6 +158,50 @@ def budget_section(budget: Budget | None, figures: Figures) -> Markup:
                 table("Budget of the most uncertain value of each family", ["Value", "u", *columns], rows),
             )
         ),
+    )
+
+
+def _columns(shares: Sequence[BudgetShare]) -> dict[str, list[float]]:
+    """The groups that make much of a variance, each with its shares; the others added up."""
+    order: dict[str, float] = {}
+    for share in shares:
+        for group, part in share.shares.items():
+            order[group] = max(order.get(group, 0.0), abs(part))
+    groups = [group for group, part in sorted(order.items(), key=lambda item: -item[1]) if part >= SMALL_SHARE]
+    columns = {group: [share.shares.get(group, 0.0) for share in shares] for group in groups}
+    rest = [sum(part for group, part in share.shares.items() if group not in groups) for share in shares]
+    if len(groups) > MOST_GROUPS:
+        for group in groups[MOST_GROUPS:]:
+            rest = [a + b for a, b in zip(rest, columns.pop(group), strict=True)]
+    if any(abs(part) >= SMALL_SHARE / 10 for part in rest):
+        columns["others"] = rest
+    return columns
+
+
+def _add_figure(shares: Sequence[BudgetShare], columns: Mapping[str, list[float]], figures: Figures) -> None:
+    named = [f"{share.kind}<br>{_label(share)}" for share in shares]
+    bars = [
+        {
+            "type": "bar",
+            "orientation": "h",
+            "name": group,
+            "y": named,
+            "x": [100.0 * part for part in parts],
+            "marker": {"color": colour, "line": {"color": "#ffffff", "width": 1}},
+            "hovertemplate": f"{group}: %{{x:.1f}} %<extra></extra>",
+        }
+        for (group, parts), colour in zip(columns.items(), [*SERIES, GREY], strict=False)
+    ]
+    figures.add(
+        "figure-budget",
+        bars,
+        {"title": {"text": "share of the variance (%)", "standoff": 6}},
+        {"autorange": "reversed", "nticks": None, "tickfont": {"color": INK}},
+        barmode="relative",
+        hovermode="closest",
+        showlegend=True,
+        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0, "traceorder": "normal"},
+        margin={"l": 10, "r": 10, "t": 8, "b": 90},
     )
 
 
