@@ -355,7 +355,7 @@ class SetupQuantity:
     @property
     def prior(self) -> float:
         """
-        What an adjustment takes it for by default: infinite: free; 0: fixed at 0; else the standard uncertainty with which it is known to be 0.
+        Its prior in an adjustment by default: infinite: free; 0: fixed at 0; else the standard uncertainty with which it is known to be 0.
         """
     @property
     def report_unit(self) -> str:
@@ -2327,7 +2327,7 @@ class Fault:
     @property
     def chi_square_gain(self) -> float:
         """
-        What it takes off chi-square.
+        How much chi-square falls without it.
         """
     @property
     def kind(self) -> str:

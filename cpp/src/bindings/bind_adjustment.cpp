@@ -305,7 +305,7 @@ void bind_faults(py::module_& m) {
         field("channel", &Fault::channel, "\"distance\", ..."),
         field("size", &Fault::size, "What was read too much, mm or rad."),
         field("standard_uncertainty", &Fault::standard_uncertainty, "Of the size."),
-        field("chi_square_gain", &Fault::chi_square_gain, "What it takes off chi-square."));
+        field("chi_square_gain", &Fault::chi_square_gain, "How much chi-square falls without it."));
     bind_record(
         m, "FaultClass", "Faults of which the readings do not tell which one happened.",
         field("members", &FaultClass::members, "The best first."),

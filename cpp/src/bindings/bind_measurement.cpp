@@ -74,7 +74,7 @@ static void bind_setup_quantities(py::module_& m) {
                 field("components", &Quantity::components, "A letter each; empty: a single one without a letter."),
                 field("of_beams", &Quantity::of_beams, "Whether there is one for each of d1 ... dn."),
                 field("prior", &Quantity::prior,
-                      "What an adjustment takes it for by default: infinite: free; 0: fixed at 0; else the standard "
+                      "Its prior in an adjustment by default: infinite: free; 0: fixed at 0; else the standard "
                       "uncertainty with which it is known to be 0."),
                 field("scale_line_prior", &Quantity::scale_line_prior, "The same on scale lines."),
                 field("usual", &Quantity::usual,

@@ -182,7 +182,8 @@ def uncertainty(
     If more than 0.1 % of the virtual calibrations give no result, the command ends with a warning
     and exit code 3: its Monte Carlo figures are those of the others.
     """
-    from stepdiag.presentation.uncertainty import input_rows, opening_rows, result_rows
+    from stepdiag.presentation.blocks import text_of
+    from stepdiag.presentation.uncertainty import input_rows, uncertainty_blocks
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.uncertainty.run import UncertaintyRequest
@@ -224,7 +225,7 @@ def uncertainty(
             from stepdiag.uncertainty.write import write_uncertainty
 
             write_uncertainty(result, path)
-        for line in (*opening_rows(result), *result_rows(result)):
+        for line in text_of(uncertainty_blocks(result)):
             say(line)
     if wanted.draws and checkpoint is None:  # a checkpoint named by the user is kept: it can continue to more samples
         kept.path.unlink(missing_ok=True)

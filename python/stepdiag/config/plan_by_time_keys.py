@@ -23,7 +23,7 @@ class PlanByTimeSection(Section):
     Head, order, uncertainties and unknowns of all plans are those of the scenario, and backward runs unless
     `[adjustment] reversal = false`."""
 
-    minutes: Positive = key(POSITIVE, "The time that there is for measuring, set-ups included.", 30.0)
+    minutes: Positive = key(POSITIVE, "The time available for measuring, set-ups included.", 30.0)
     feed_mm_per_min: Positive = key(POSITIVE, "Feed of all moves, along a straight line.", 6000.0)
     acceleration_mm_per_s2: Positive = key(POSITIVE, "Acceleration, and deceleration, of all moves.", 1000.0)
     seconds_per_mm: Positive | None = key(

@@ -43,13 +43,13 @@ def reason_text(reason: FitReason) -> str:
         case "prior" if reason.channel == "machine_drift":
             return (
                 f"the drift of the functional point along {'XYZ'[reason.component]} is {reason.value:.3g} standard "
-                f"uncertainties from what [adjustment] takes it for (at most {reason.limit:g} is credible)"
+                f"uncertainties from its prior in [adjustment] (at most {reason.limit:g} is credible)"
             )
         case "prior":
             name = f"{reason.channel.replace('_', ' ')}{_component(reason)}"
             return (
-                f"{name} of line {reason.line} is {reason.value:.3g} standard uncertainties from what [adjustment] "
-                f"takes it for (at most {reason.limit:g} is credible)"
+                f"{name} of line {reason.line} is {reason.value:.3g} standard uncertainties from its prior in "
+                f"[adjustment] (at most {reason.limit:g} is credible)"
             )
         case "prior_scatter":
             return _prior_scatter(reason)
@@ -59,12 +59,12 @@ def reason_text(reason: FitReason) -> str:
             return f"the noise is about {noise} what is stated"
         case "scaled":
             return (
-                f"all uncertainties were multiplied by {noise.removesuffix(' times')}, which the readings' scatter says"
+                f"all uncertainties were multiplied by {noise.removesuffix(' times')}, to match the readings' scatter"
             )
         case "fault":
             return (
                 f"fault {reason.fault} ({reason.channel} on line {reason.line}) was found and not corrected "
-                f"(it takes {reason.value:.3g} off chi-square; {reason.limit:g} and more is none by chance)"
+                f"(without it chi-square falls by {reason.value:.3g}; chance alone explains less than {reason.limit:g})"
             )
         case "alternatives":
             value, unit = report_value(units_of(reason.parameter), reason.value)

@@ -3,7 +3,7 @@
 1. The lines to choose from are those of the scenario's plan, four body diagonals, six face diagonals, three single axes
    and three scale lines. A reversed line ("ppn" for "nnp") is the same line. All lines of a plan have as many steps:
    what differs by line is where scale lines are read, at their ends or at every step.
-2. For each setting, and for some times around the one that there is (and for the shortest one), lines are exchanged as
+2. For each setting, and for some times around the available one (and for the shortest one), lines are exchanged as
    in optimum experimental design: of all sets with one line more, one less, or one in place of another, that best set
    is taken which is better than the present one; until there is none (V. V. Fedorov, Theory of Optimal Experiments,
    1972; R. D. Cook and C. J. Nachtsheim, Technometrics 22 (1980) 315). The order of lines and settings is fixed, and
@@ -57,7 +57,7 @@ _SCALES: Final = _LINES[10:]
 _STARTS: Final = ((_LINES[:4], _SCALES), (_LINES[:4], _SCALES[:2]), (_LINES[:3], _SCALES), (_LINES[4:10], ()))
 SCREENED: Final = ((5, 10), (10, 20), (25, 50))  # steps; the first of which the mirror is not too small
 SLACK: Final = 1.25  # of estimates
-TIMES: Final = (0.7, 1.0, 1.2, 1.5, 2.0)  # by the time that there is
+TIMES: Final = (0.7, 1.0, 1.2, 1.5, 2.0)  # by the available time
 REFINED: Final = 2  # plans that are exchanged by exact covariances
 
 FloatArray = npt.NDArray[np.float64]
@@ -70,8 +70,8 @@ def best_plans(
 ) -> list[Outcome]:
     """Plans among which is the best one for an aim (`choose`), and others that are faster or better.
 
-    `times`: in place of those of the scenario's [plan_by_time]. `progress` is told how many of how many parts are done.
-    Raises InvalidArgument where the scenario names lines that there are not."""
+    `times`: in place of those of the scenario's [plan_by_time]. `progress` receives how many of how many parts are
+    done. Raises InvalidArgument where the scenario names lines that do not exist."""
     report = progress or (lambda done, total: None)
     if scenario.known.keys.plan_by_time.line_sets is not None:
         stated, found = stated_candidates(scenario), []

@@ -51,7 +51,7 @@ def observe(scenario: Scenario | Known) -> tuple[_core.Measurement, Adjustment]:
 def prospects(
     known: Known, steps: Sequence[int], progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Prospect]:
-    """By the number of steps, ascending. `progress` is told how many of how many are done."""
+    """By the number of steps, ascending. `progress` receives how many of how many are done."""
     found: list[Prospect] = []
     for count in sorted(set(steps)):
         found.append(_prospect(known, count))

@@ -27,7 +27,7 @@ def plan(
 
     Args:
         scenario: what is measured with what; its own plan is one of those that are looked at.
-        minutes: the time that there is, set-ups included; none: [plan_by_time] minutes, or with goals any.
+        minutes: the available time, set-ups included; none: [plan_by_time] minutes, or with goals any.
         spacing: how far nodes may be apart, mm; none: as far as those of the scenario's plan.
         best_at: what is to be most certain: "volume", "length", "angle", "squareness", or "faults".
         volume_u: goal: standard uncertainty of the functional point in the volume, mm.
@@ -35,7 +35,7 @@ def plan(
         progress: called with the number of parts that are done, and of all.
 
     Raises:
-        InvalidArgument: the scenario names lines that there are not, or an argument is not valid.
+        InvalidArgument: the scenario names lines that do not exist, or an argument is not valid.
     """
     goals = [
         *([volume_goal(volume_u / MICROMETRE)] if volume_u is not None else []),

@@ -180,7 +180,7 @@ class Aim:
 def aim_of(
     known: Known, *, minutes: float | None, spacing: float | None, family: Family, goals: Sequence[Goal] = ()
 ) -> Aim:
-    """The aim in the time that there is: none is [plan_by_time] minutes, or with goals any. No `spacing`: that of the
+    """The aim in the available time: none is [plan_by_time] minutes, or with goals any. No `spacing`: that of the
     scenario's own plan."""
     available = known.keys.plan_by_time.minutes if minutes is None and not goals else minutes
     near = own_spacing(known) if spacing is None else spacing
@@ -241,7 +241,7 @@ def _returns(known: Known, steps: int) -> list[int]:
 
 def stated_candidates(scenario: Scenario) -> list[Candidate]:
     """All plans with the sets of lines that [plan_by_time] states, and with those of the scenario's own. Raises
-    InvalidArgument where it states lines that there are not, or too many plans."""
+    InvalidArgument where it states lines that do not exist, or too many plans."""
     known = scenario.known
     keys, plan = known.keys.plan_by_time, known.plan
     sets = {(tuple(plan.lines), tuple(plan.scale_lines)): None}

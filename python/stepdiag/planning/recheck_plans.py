@@ -23,7 +23,7 @@ from stepdiag.scenario.truth import truth_of
 from stepdiag.units import MINUTE
 
 POWER: Final = 0.95
-FAR: Final = 2.0  # times the time that there is, up to which plans are looked at
+FAR: Final = 2.0  # times the available time, up to which plans are looked at
 IMPLAUSIBLE: Final = 2.0  # priors, beyond which a change counts no further
 BEYOND: Final = 10.0  # priors: such a change is not one of those that are looked for
 
@@ -153,7 +153,7 @@ def powers(
     alpha: float = ALPHA,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Power]:
-    """Of all candidates, the fastest first. `progress` is told how many of how many are done."""
+    """Of all candidates, the fastest first. `progress` receives how many of how many are done."""
     everything = candidates(scenario, baseline, minutes)
     result: list[Power] = []
     gains: tuple[float, ...] | None = None
@@ -203,7 +203,7 @@ def power_of(
 
 def choose(found: Sequence[Power], minutes: float, limit: float) -> Power | None:
     """Of the plans within the time the one that leaves the fewest terms that may move the tool by more than `limit`,
-    mm, unseen; of these the one that leaves least at all, and of such as are hardly worse the fastest."""
+    mm, unseen; of these the one that leaves least at all, and among those that are hardly worse the fastest."""
     fitting = [one for one in found if one.minutes <= minutes and not one.trouble]
     if not fitting:
         return None

@@ -1,6 +1,6 @@
 """A comparison of two calibrations in blocks, as CSV and as a labelled table."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -17,13 +17,14 @@ from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.whole_files import write_whole
 from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
-from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock
+from stepdiag.presentation.blocks import Block, HeadingBlock, RowBlock, TableBlock, VerdictBlock
 from stepdiag.units import report_value
 
 if TYPE_CHECKING:
     import xarray as xr
 
 EFFECTS_SHOWN: Final = 5
+LEAST_PROBABILITY: Final = 1e-12  # that is shown
 
 
 def comparison_blocks(comparison: Comparison, change: VolumeChange, name_a: str, name_b: str) -> Iterator[Block]:
@@ -35,6 +36,7 @@ def comparison_blocks(comparison: Comparison, change: VolumeChange, name_a: str,
     volume, tool = (" x ".join(f"{edge:g}" for edge in a.volume), " ".join(f"{offset:g}" for offset in a.tool))
     yield RowBlock("machine", f"chain {a.chain}, volume {volume} mm, tool offset {tool} mm")
     yield HeadingBlock("error of the tool in the volume")
+    yield _verdict(change, (comparison.a.fit, comparison.b.fit))
     yield from _volume_blocks(change)
     if comparison.agreement is not None:
         yield from _agreement_rows(comparison.agreement)
@@ -46,6 +48,22 @@ def comparison_blocks(comparison: Comparison, change: VolumeChange, name_a: str,
     )
     yield HeadingBlock("how to read it")
     yield from _rules(comparison)
+
+
+def _verdict(change: VolumeChange, fits: Collection[str | None]) -> VerdictBlock:
+    """Whether the machine became better or worse, as far as its largest error shows."""
+    figure = change.largest
+    verdict, headline = "undecided", "whether the largest error has changed is not known"
+    why = change.no_verdict_because
+    if "rejected" in fits:
+        why = "a fit is rejected, so that these figures do not show whether the machine has changed"
+    elif not np.isnan(figure.change):
+        way = "smaller" if figure.change < 0.0 else "larger"
+        headline = f"the largest error is {_micrometres(abs(figure.change))} µm {way} by B than by A"
+        if figure.verdict is not None:
+            verdict, headline = figure.verdict, f"{figure.verdict}: {headline}"
+            why = f"the 95 % interval of B - A {'contains' if verdict == 'undecided' else 'excludes'} 0"
+    return VerdictBlock("change", verdict, headline, why)
 
 
 def _volume_blocks(change: VolumeChange) -> Iterator[Block]:
@@ -62,7 +80,7 @@ def _volume_blocks(change: VolumeChange) -> Iterator[Block]:
         mark = "µm  significant" if effect.significant else "µm"
         rows.append((effect.parameter, _micrometres(effect.largest), _micrometres(effect.rms), mark))
     if rows:
-        yield TableBlock(tuple(rows), ("errors that differences make alone", "largest", "rms", ""), left=(0, 3))
+        yield TableBlock(tuple(rows), ("error by one difference alone", "largest", "rms", ""), left=(0, 3))
 
 
 def _agreement_rows(agreement: TruthAgreement) -> Iterator[Block]:
@@ -109,7 +127,11 @@ def _row(comparison: Comparison, difference: Difference) -> tuple[str, ...]:
         return (*largest, "-", "-", "-", REPORT_UNIT[kind])
     mark = " significant" if comparison.is_significant(difference) else ""
     normalised = f"{float(difference.normalised[worst]):.3g}"
-    return (*largest, normalised, _place(difference, worst), f"{probability:.3g}", f"{REPORT_UNIT[kind]}{mark}")
+    return (*largest, normalised, _place(difference, worst), _chance(probability), f"{REPORT_UNIT[kind]}{mark}")
+
+
+def _chance(probability: float) -> str:
+    return f"{probability:.3g}" if probability >= LEAST_PROBABILITY else f"< {LEAST_PROBABILITY:g}"
 
 
 def _place(difference: Difference, k: int) -> str:
@@ -132,10 +154,10 @@ def _rules(comparison: Comparison) -> Iterator[Block]:
         if comparison.agreement is not None:
             yield RowBlock("u", "that of the calibration; the error map is taken as exact")
         else:
-            yield NoteBlock(
-                "u = sqrt(u_A^2 + u_B^2), as if A and B were independent: two evaluations of one run are not,"
+            yield RowBlock(
+                "u",
+                "sqrt(u_A^2 + u_B^2), as if A and B were independent; two evaluations of one run differ by less",
             )
-            yield NoteBlock("and then differ by less than u says")
     else:
         yield RowBlock("significance", "not known, because one of the two has no standard uncertainties")
     for which in "AB":

@@ -30,7 +30,7 @@ from stepdiag.units import MICROMETRE, MICRORADIAN
 LINES: Final = {"body diagonal": "body", "face diagonal": "face", "single-axis line": "single", "scale line": "scale"}
 FIGURES: Final = ("volume", "pos.", "str.", "angle", "squ.", "found", "kinds")
 UNITS: Final = ("µm", *(REPORT_UNIT[kind] for kind in KINDS), "µm", "")
-FAR: Final = 2.0  # times the time that there is: how far the table goes on
+FAR: Final = 2.0  # times the available time: how far the table goes on
 
 
 def inputs_row(known: Known) -> str:

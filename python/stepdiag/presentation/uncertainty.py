@@ -10,7 +10,7 @@ import numpy.typing as npt
 from stepdiag import _core
 from stepdiag.display import lines_text
 from stepdiag.findings.temperature import reference_mark
-from stepdiag.presentation.text_columns import text_columns
+from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock
 from stepdiag.scenario.uncertain_inputs import key_unit
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
 from stepdiag.units import report_value
@@ -38,43 +38,45 @@ def _distribution(distribution: _core.Distribution, name: str, unit: float) -> s
     return text
 
 
-def opening_rows(result: UncertaintyResult) -> Iterator[str]:
-    """What is calibrated, and how many things are uncertain about it."""
+def uncertainty_blocks(result: UncertaintyResult) -> Iterator[Block]:
+    """What is calibrated, how many things are uncertain about it, and all tables of the result."""
     known, plan = result.known, result.known.plan
     if result.warning is not None:
-        yield f"not to be trusted: {result.warning}"
+        yield RowBlock("not to be trusted", result.warning)
     derived = len(result.outputs) - result.entries
-    yield (f"virtual calibrations: method {result.method}, {lines_text(plan)}, readings {', '.join(known.signals)}")
-    yield (
-        f"uncertain: {len(known.uncertain.inputs)} inputs, {len(known.uncertain.noise)} kinds of noise; "
-        f"outputs: {result.entries} values of the 21 parameters" + (f", {derived} derived" if derived else "")
+    yield RowBlock(
+        "virtual calibrations", f"method {result.method}, {lines_text(plan)}, readings {', '.join(known.signals)}"
+    )
+    yield RowBlock(
+        "uncertain",
+        f"{len(known.uncertain.inputs)} inputs, {len(known.uncertain.noise)} kinds of noise; "
+        f"outputs: {result.entries} values of the 21 parameters" + (f", {derived} derived" if derived else ""),
     )
     reference = None if known.expansion is None else known.expansion.expansion.reference
-    yield f"temperature: positioning errors are {reference_mark(reference)}"
-
-
-def result_rows(result: UncertaintyResult) -> Iterator[str]:
-    """All tables of a result."""
+    yield RowBlock("temperature", f"positioning errors are {reference_mark(reference)}")
     if result.propagation is not None:
-        yield ""
-        yield "propagation (GUM), standard uncertainties u:"
-        yield from _propagation_table(result)
-        yield from _budgets(result)
+        yield HeadingBlock("propagation (GUM), standard uncertainties u")
+        yield _propagation_table(result)
+        yield TableBlock(
+            tuple(_budgets(result)),
+            title="where the largest ones come from, in shares of the variance",
+            left=(0, 1),
+        )
     if result.monte_carlo is not None:
-        yield ""
-        yield from _monte_carlo_table(result)
+        yield from _monte_carlo_blocks(result)
     if result.comparison is not None:
-        yield ""
-        yield from _validation_table(result)
+        yield from _validation_blocks(result)
     if result.entries < len(result.outputs):
-        yield ""
-        yield from _derived_table(result)
+        yield HeadingBlock("derived quantities")
+        yield _derived_table(result)
     if result.volume is not None:
-        yield ""
-        yield from _volume_table(result)
+        yield HeadingBlock(
+            "ranges over the volume (V_XYZ of ISO 230-1, errors of body diagonals), by the propagated covariance"
+        )
+        yield _volume_table(result)
 
 
-def _propagation_table(result: UncertaintyResult) -> Iterator[str]:
+def _propagation_table(result: UncertaintyResult) -> TableBlock:
     found = result.propagation
     assert found is not None
     u, expanded = np.asarray(found.standard_uncertainty), np.asarray(found.expanded(result.coverage))
@@ -89,7 +91,7 @@ def _propagation_table(result: UncertaintyResult) -> Iterator[str]:
         rows.append(
             [family, *(f"{x:.3g} {name}" for x in (median, largest, wide)), degrees, label(result.outputs[worst])]
         )
-    yield from _table(heading, rows)
+    return _table(heading, rows)
 
 
 def _worst(result: UncertaintyResult, u: FloatArray) -> Iterator[tuple[str, npt.NDArray[np.intp], int]]:
@@ -102,29 +104,31 @@ def _worst(result: UncertaintyResult, u: FloatArray) -> Iterator[tuple[str, npt.
                 yield family, uncertain, int(uncertain[np.argmax(u[uncertain])])
 
 
-def _budgets(result: UncertaintyResult) -> Iterator[str]:
+def _budgets(result: UncertaintyResult) -> Iterator[tuple[str, str]]:
+    """Families, each with the groups of inputs that make the variance of its most uncertain value."""
     found = result.propagation
     assert found is not None
     u = np.asarray(found.standard_uncertainty)
-    yield "where the largest ones come from, in shares of the variance:"
     for family, _, worst in _worst(result, u):
         shares = {group: float(part[worst] / u[worst]) ** 2 for group, part in found.budget.items()}
         shares["between groups"] = float(np.asarray(found.between_groups)[worst]) / u[worst] ** 2
         named = sorted(((s, g) for g, s in shares.items() if abs(s) >= SMALL_SHARE), reverse=True)
         rest = sum(shares.values()) - sum(share for share, _ in named)
         text = ", ".join(f"{group} {share:.1%}" for share, group in named)
-        yield f"  {family:<13} {text}" + (f", others {rest:.1%}" if rest >= SMALL_SHARE / 10.0 else "")
+        yield family, text + (f", others {rest:.1%}" if rest >= SMALL_SHARE / 10.0 else "")
 
 
-def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
+def _monte_carlo_blocks(result: UncertaintyResult) -> Iterator[Block]:
     found = result.monte_carlo
     assert found is not None
     lost = f", {found.lost:,} without a result" if found.lost else ""
-    yield f"Monte Carlo (JCGM 101): {found.samples:,} samples, seed {result.seed}, {found.target}{lost}"
+    yield HeadingBlock(f"Monte Carlo (JCGM 101): {found.samples:,} samples, seed {result.seed}, {found.target}{lost}")
     yield from _stability(result)
     wanted = ENOUGH / (1.0 - result.coverage)
     if found.stability is None and found.samples < wanted:
-        yield f"  note: JCGM 101 (7.2.2) wants about {wanted:,.0f} samples for a {_percent(result)} interval"
+        yield NoteBlock(
+            f"note: JCGM 101 (7.2.2) wants about {wanted:,.0f} samples for a {_percent(result)} interval", indented=True
+        )
     u = np.asarray(found.standard_uncertainty)
     heading = ["family", "median u", "largest u", f"{_percent(result)} interval about the mean", "where"]
     rows = []
@@ -135,10 +139,10 @@ def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
         median, largest = (report_value(unit, x)[0] for x in (np.median(u[members]), u[worst]))
         cells = [f"{median:.3g} {name}", f"{largest:.3g} {name}", f"{low:+.3g} {high:+.3g} {name}"]
         rows.append([family, *cells, label(result.outputs[worst])])
-    yield from _table(heading, rows)
+    yield _table(heading, rows)
 
 
-def _validation_table(result: UncertaintyResult) -> Iterator[str]:
+def _validation_blocks(result: UncertaintyResult) -> Iterator[Block]:
     """By family how many outputs are validated, the worst of them, and why the worst that is not is not."""
     found = result.comparison
     assert found is not None
@@ -157,14 +161,18 @@ def _validation_table(result: UncertaintyResult) -> Iterator[str]:
         cells = [f"{report_value(unit, float(size))[0]:.2g} {name}".rstrip() for size in sizes]
         rows.append([family, f"{validated} of {len(members)}", *cells, label(result.outputs[worst])])
         if not found.validated[worst]:
-            reasons.append(f"  {family}, {label(result.outputs[worst])}: {_in_report_signs(found.reason[worst])}")
-    yield (
+            reasons.append(
+                NoteBlock(
+                    f"{family}, {label(result.outputs[worst])}: {_in_report_signs(found.reason[worst])}", indented=True
+                )
+            )
+    yield HeadingBlock(
         f"validation of the propagation (JCGM 101, 8): ends of y ± U beside those of the {_percent(result)} interval, "
         f"to {_digits(result)} of u"
     )
-    yield from _table(["family", "validated", "largest d", "tolerance", "sampling", "where"], rows)
+    yield _table(["family", "validated", "largest d", "tolerance", "sampling", "where"], rows)
     if reasons:
-        yield "where propagation fails most, and why:"
+        yield NoteBlock("where propagation fails most, and why:")
         yield from reasons
 
 
@@ -172,26 +180,29 @@ def _in_report_signs(text: str) -> str:
     return text.replace(" urad", " µrad").replace(" um", " µm")
 
 
-def _stability(result: UncertaintyResult) -> Iterator[str]:
+def _stability(result: UncertaintyResult) -> Iterator[Block]:
     """Of an adaptive run: whether the digits that were asked for are there."""
     found = result.monte_carlo
     assert found is not None
     if found.stability is None:
         return
     if found.stability.stable:
-        yield f"  adaptive: every output is stable to {_digits(result)} of its u (JCGM 101, 7.9)"
+        yield NoteBlock(
+            f"adaptive: every output is stable to {_digits(result)} of its u (JCGM 101, 7.9)", indented=True
+        )
     else:
         worst = result.outputs[found.stability.output]
-        yield (
-            f"  adaptive: {found.stability.unstable} of {len(result.outputs)} outputs are not yet stable to "
+        yield NoteBlock(
+            f"adaptive: {found.stability.unstable} of {len(result.outputs)} outputs are not yet stable to "
             f"{_digits(result)} of their u; the {found.stability.figure} of {label(worst)} is the worst, "
-            f"{found.stability.ratio:.3g} times the tolerance; -n sets the largest number of samples"
+            f"{found.stability.ratio:.3g} times the tolerance; -n sets the largest number of samples",
+            indented=True,
         )
 
 
-def _derived_table(result: UncertaintyResult) -> Iterator[str]:
+def _derived_table(result: UncertaintyResult) -> TableBlock:
     found, other = result.monte_carlo, result.propagation
-    heading = ["derived", "value", "u"]
+    heading = ["quantity", "value", "u"]
     heading += [f"U, {_percent(result)}"] if found is None else [f"{_percent(result)} interval", "u, propagated"]
     rows = []
     expanded = None if other is None else np.asarray(other.expanded(result.coverage))
@@ -211,10 +222,10 @@ def _derived_table(result: UncertaintyResult) -> Iterator[str]:
             assert expanded is not None
             cells = [show(other.value[k]), show(other.standard_uncertainty[k]), show(expanded[k])]
         rows.append([label(output), *cells])
-    yield from _table(heading, rows)
+    return _table(heading, rows)
 
 
-def _volume_table(result: UncertaintyResult) -> Iterator[str]:
+def _volume_table(result: UncertaintyResult) -> TableBlock:
     found = result.volume
     assert found is not None
     rows = []
@@ -226,8 +237,7 @@ def _volume_table(result: UncertaintyResult) -> Iterator[str]:
         value, u, low, high = (report_value(volume_units(name), float(x))[0] for x in numbers)
         unit = report_value(volume_units(name), 0.0)[1]
         rows.append([name, f"{value:.4g} {unit}", f"{u:.3g} {unit}", f"{low:.4g} .. {high:.4g} {unit}"])
-    yield "ranges over the volume (V_XYZ of ISO 230-1, errors of body diagonals), by the propagated covariance:"
-    yield from _table(["range", "value", "u", f"{_percent(result)} interval"], rows)
+    return _table(["range", "value", "u", f"{_percent(result)} interval"], rows)
 
 
 def _digits(result: UncertaintyResult) -> str:
@@ -238,7 +248,7 @@ def _percent(result: UncertaintyResult) -> str:
     return f"{100.0 * result.coverage:.8g} %"
 
 
-def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Columns of text, the first and a last one of words to the left, numbers to the right."""
+def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> TableBlock:
+    """Numbers by row, the first column and a last one of places are words."""
     left = (0, len(heading) - 1) if heading[-1] == "where" else (0,)
-    yield from text_columns([heading, *rows], left)
+    return TableBlock(tuple(map(tuple, rows)), tuple(heading), left=left)

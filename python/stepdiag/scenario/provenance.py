@@ -26,7 +26,7 @@ def provenance_of(
     *,
     method: Literal["conventional", "enhanced", "adjustment"] = "adjustment",
 ) -> dict[str, str]:
-    """Fingerprints (SHA-256) and options of an evaluation, for `Calibration.with_provenance` or `write_calibration`.
+    """Fingerprints (SHA-256) and options of an evaluation, for `Calibration.with_provenance` or `Calibration.write`.
 
     They depend on the bytes of the files alone, not on their names or the time. The error map of a scenario counts in
     none of them: no evaluation reads it. A run that is no file, but a pipe, has no fingerprint. Raises InvalidArgument

@@ -44,7 +44,7 @@ def virtual_calibrations(
 
 
 def _air(scenario: Scenario) -> tuple[_core.Environment | None, _core.Environment | None]:
-    """The true and the assumed air; where nothing is said of it, but its state is uncertain, that of 20 °C."""
+    """The true and the assumed air; that of 20 °C if the scenario has none and its state is uncertain."""
     truth = scenario.truth
     if scenario.known.assumed_air is not None:  # whose readings are reduced with what is recorded
         air = truth.environment or scenario.known.assumed_air

@@ -99,7 +99,7 @@ def test_volume_before_and_after_stands_before_the_parameters(here: Path, capsys
         f"{value * 1e3:.4g}" for value in (change.largest.a, change.largest.b, change.largest.change)
     ]
     assert "no verdict: no covariance of A (write it as .nc)" in said
-    first = said[said.index(next(line for line in said if "differences make alone" in line)) + 1].split()
+    first = said[said.index(next(line for line in said if "by one difference alone" in line)) + 1].split()
     assert first == [
         "EXX",
         f"{change.effects[0].largest * 1e3:.4g}",

@@ -13,7 +13,8 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.figures.uncertainty import draw_observation, draw_uncertainty, read_drawn_uncertainty
 from stepdiag.parameters import FUNCTIONS
-from stepdiag.presentation.uncertainty import opening_rows
+from stepdiag.presentation.blocks import text_of
+from stepdiag.presentation.uncertainty import uncertainty_blocks
 from stepdiag.uncertainty.write import write_uncertainty
 
 UNCERTAIN = SCENARIO + "[uncertainty]\ndistance_um = 0.1\nscale_ppm = 0.5\nreflector_urad = 300.0\n"
@@ -66,7 +67,9 @@ def test_heading_says_whether_positioning_is_as_found(
 ) -> None:
     known = sd.parse_scenario(UNCERTAIN + section)
     result = sd.montecarlo.evaluate_uncertainty(known, sd.montecarlo.UncertaintyRequest())
-    assert f"temperature: positioning errors are {words.removeprefix('positioning ')}" in list(opening_rows(result))
+    assert f"temperature: positioning errors are {words.removeprefix('positioning ')}" in list(
+        text_of(uncertainty_blocks(result))
+    )
     if name is not None:
         write_uncertainty(result, tmp_path / name)
     drawn = result if name is None else read_drawn_uncertainty(tmp_path / name)

@@ -16,7 +16,8 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.io.netcdf import open_dataset
-from stepdiag.presentation.uncertainty import opening_rows, result_rows
+from stepdiag.presentation.blocks import text_of
+from stepdiag.presentation.uncertainty import uncertainty_blocks
 from stepdiag.scenario.description import parse_scenario
 from stepdiag.uncertainty.result import UncertaintyResult, find_output, label, only_survivors
 from stepdiag.uncertainty.table import uncertainty_table
@@ -142,7 +143,7 @@ def test_propagation_alone_makes_a_table_without_samples(tmp_path: Path) -> None
 
 
 def test_report_names_the_largest_of_each_family_and_where_it_comes_from() -> None:
-    said = "\n".join(result_rows(made_up()))
+    said = "\n".join(text_of(uncertainty_blocks(made_up())))
     assert "EXX at 80 mm" in said
     assert "EAX at 80 mm" in said
     assert "100,000 samples" in said
@@ -153,7 +154,7 @@ def test_report_names_the_largest_of_each_family_and_where_it_comes_from() -> No
 
 
 def test_validation_counts_what_agrees_and_says_why_the_worst_does_not() -> None:
-    said = "\n".join(result_rows(made_up()))
+    said = "\n".join(text_of(uncertainty_blocks(made_up())))
     assert re.search(r"positioning +3 of 3", said)
     assert "squareness, C0Y: the mean is shifted by 0.5 µrad" in said
     table = uncertainty_table(made_up())
@@ -164,10 +165,10 @@ def test_validation_counts_what_agrees_and_says_why_the_worst_does_not() -> None
 
 def test_too_few_samples_for_the_interval_are_noted() -> None:
     result = made_up()
-    assert "wants about 200,000 samples for a 95 % interval" in "\n".join(result_rows(result))
+    assert "wants about 200,000 samples for a 95 % interval" in "\n".join(text_of(uncertainty_blocks(result)))
     assert result.monte_carlo is not None
     result.monte_carlo.samples = 200_000
-    assert "wants about" not in "\n".join(result_rows(result))
+    assert "wants about" not in "\n".join(text_of(uncertainty_blocks(result)))
 
 
 def test_adaptive_run_that_did_not_end_says_so() -> None:
@@ -175,11 +176,11 @@ def test_adaptive_run_that_did_not_end_says_so() -> None:
     assert result.monte_carlo is not None
     stability = {"ratio": 1.5, "output": 2, "figure": "upper end", "unstable": 3}
     result.monte_carlo.stability = SimpleNamespace(stable=False, **stability)
-    said = "\n".join(result_rows(result))
+    said = "\n".join(text_of(uncertainty_blocks(result)))
     assert "3 of 8 outputs are not yet stable to 2 digits" in said
     assert "the upper end of EXX at 80 mm is the worst, 1.5 times" in said
     result.monte_carlo.stability = SimpleNamespace(stable=True, **stability)
-    assert "every output is stable" in "\n".join(result_rows(result))
+    assert "every output is stable" in "\n".join(text_of(uncertainty_blocks(result)))
 
 
 @pytest.mark.parametrize(("text", "row"), [("C0Y", 6), ("EXX@40", 1), ("EXX", 2), ("X at (1, 2, 3)", 7)])
@@ -215,8 +216,8 @@ def test_figures_of_survivors_say_so_in_first_line_and_file() -> None:
     assert sound.warning is None
     assert spoilt.warning is not None
     assert spoilt.warning.startswith("101 of 100,101 virtual calibrations gave no")
-    assert next(iter(opening_rows(spoilt))) == f"not to be trusted: {spoilt.warning}"
-    assert next(iter(opening_rows(sound))).startswith("virtual calibrations")
+    assert next(iter(text_of(uncertainty_blocks(spoilt)))) == f"not to be trusted: {spoilt.warning}"
+    assert next(iter(text_of(uncertainty_blocks(sound)))).startswith("virtual calibrations")
     assert uncertainty_table(spoilt).attrs["warning"] == spoilt.warning
     assert "warning" not in uncertainty_table(sound).attrs
     assert f"# warning={spoilt.warning}\n" in uncertainty_csv(spoilt)

@@ -95,7 +95,7 @@ struct Fault {
     std::string channel;
     double size;                  // what was read too much, mm or rad; by a factor where the line is farthest
     double standard_uncertainty;  // of the size
-    double chi_square_gain;       // what it takes off chi-square
+    double chi_square_gain;       // how much chi-square falls without it
 };
 
 // What was done about a fault. left_out: all readings that may be the wrong one, so that what only they determined is

@@ -1,5 +1,5 @@
 // Adjusts a run and judges the fit: search for faults of readings, exact adjustment with what was done about them,
-// tests of what is left, verdict (docs/conventions.md, "Verdict of a fit").
+// tests of the remaining residuals, verdict (docs/conventions.md, "Verdict of a fit").
 #pragma once
 
 #include "stepdiag/adjustment/options.hpp"

@@ -45,7 +45,7 @@ struct SetupQuantityRecord {
     std::string_view unit;         // of the library
     std::string_view report_unit;  // as in keys
     std::string_view meaning;
-    // What an adjustment takes it for by default, on measured lines and on scale lines. A drift is fixed where readings
+    // Its prior in an adjustment by default, on measured lines and on scale lines. A drift is fixed where readings
     // of the line have no time, and the laser is on a scale line whose mirror no reading tells.
     PriorUncertainty prior, scale_line_prior;
     std::string_view components = {};       // a letter each; empty: a single one without a letter

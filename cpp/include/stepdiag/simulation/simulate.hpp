@@ -19,7 +19,7 @@
 namespace stepdiag {
 
 // Standard deviations of an independent Gaussian per field. The noise of a field depends on the seed, its row and its
-// channel only, not on what else is simulated.
+// channel only, not on the rest of the simulation.
 struct Noise {
     double distance = 0.0;  // mm; also of d1 ... dn
     double tilt = 0.0;      // rad

@@ -39,21 +39,28 @@ def element(name: str, /, *content: object, **attributes: object) -> Markup:
 
 
 def table(
-    caption: object, heading: Sequence[object], rows: Iterable[Sequence[object]], class_: str | None = None
+    caption: object,
+    heading: Sequence[object],
+    rows: Iterable[Sequence[object]],
+    class_: str | None = None,
+    *,
+    under: str = "",
 ) -> Markup:
-    """A data table; the first cell of each row is its heading."""
+    """A data table; the first cell of each row is its heading. Without a caption, its name for those who do not see it
+    is the heading that it stands under."""
     head = element("thead", element("tr", *(element("th", cell, scope="col") for cell in heading))) if heading else None
     body = [
         element("tr", element("th", first, scope="row"), *(element("td", cell) for cell in others))
         for first, *others in rows
     ]
+    named = element("caption", caption) if caption else element("caption", under, class_="unseen")
     return element(
         "div",
-        element("table", element("caption", caption), head, element("tbody", *body), class_=class_),
+        element("table", named, head, element("tbody", *body), class_=class_),
         class_="scroll",
         tabindex="0",
         role="region",
-        aria_label=caption,
+        aria_label=caption or under,
     )
 
 
@@ -70,13 +77,14 @@ def definitions(pairs: Iterable[tuple[object, object]], class_: str | None = Non
 
 
 def sentence(text: str) -> str:
-    """A sentence of a block as a page has it."""
-    return f"{text[0].upper()}{text[1:]}." if text else ""
+    """A sentence of a block as a page has it. A symbol at its beginning keeps its case: u is not U."""
+    return f"{text if text.split()[0] == 'u' else text[0].upper() + text[1:]}." if text else ""
 
 
 def html_of(blocks: Iterable[Block]) -> Markup:
     """Blocks as a page has them. Pictures are left out: a page draws its own."""
     parts: list[Markup] = []
+    above = ""  # the heading above
     for kind, group in groupby(blocks, type):
         if kind is RowBlock:
             said = [row for row in group if isinstance(row, RowBlock)]
@@ -88,12 +96,13 @@ def html_of(blocks: Iterable[Block]) -> Markup:
         for block in group:
             match block:
                 case HeadingBlock(text):
-                    parts.append(element("h3", text))
+                    above = sentence(text)[:-1]
+                    parts.append(element("h3", above))
                 case VerdictBlock(verdict=verdict, headline=headline, why=why, because=because):
                     parts.append(element("p", element("strong", sentence(headline)), f" {sentence(why)}"))
                     parts += _reasons(verdict, because)
                 case TableBlock(rows, columns, title):
-                    parts.append(table(title, columns, rows))
+                    parts.append(table(title, columns, rows, under=above))
                 case NoteBlock(text):
                     parts.append(element("p", sentence(text), class_="note"))
     return markup(*parts)

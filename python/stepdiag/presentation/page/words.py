@@ -2,19 +2,17 @@
 
 import math
 import shlex
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from typing import Any, Final
-
-import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.volume import VolumeErrors
-from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.findings.meaning import PROVENANCE, UNVERIFIED, fit_words, headline, is_valid
 from stepdiag.findings.temperature import temperature_text
-from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
+from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units
 from stepdiag.presentation.blocks import NoteBlock
+from stepdiag.presentation.comparison import comparison_blocks
 from stepdiag.presentation.fit import fit_blocks
 from stepdiag.presentation.page.contents import Contents
 from stepdiag.presentation.page.header import TITLES
@@ -29,7 +27,7 @@ from stepdiag.presentation.page.html import (
     sentence,
     table,
 )
-from stepdiag.presentation.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
+from stepdiag.presentation.page.numbers import COVERAGE_FACTOR, NBSP, moment, position, shown, with_interval
 from stepdiag.presentation.page.volume import ErrorInVolume
 from stepdiag.presentation.volume import length_text, limit_verdict, place_of_largest, why_not_known
 
@@ -49,8 +47,6 @@ _RESTS_ON: Final = {
     None: "Whether the calibration is valid is not known.",
 }
 EARLIER: Final = "The earlier calibration is"
-LEAST_PROBABILITY: Final = 1e-12  # that is shown
-MOST_EFFECTS: Final = 6
 SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "unchecked": "?", None: "?"}
 
 
@@ -334,98 +330,15 @@ def commands_section(contents: Contents, command: str) -> Markup:
     )
 
 
-def _probability(probability: float | None) -> str:
-    if probability is None:
-        return NOT_KNOWN
-    return f"{probability:.2g}" if probability >= LEAST_PROBABILITY else f"below {LEAST_PROBABILITY:g}"
-
-
 def comparison_section(contents: Contents) -> Markup | None:
     """Before and after: in the volume, and parameter by parameter."""
     comparison, change = contents.comparison, contents.change
     if comparison is None or change is None:
         return None
-    rows = []
-    for difference in comparison.differences:
-        kind, k = kind_of(difference.parameter), difference.largest
-        unit, u = REPORT_UNIT[kind], float(difference.standard_uncertainty[k])
-        rows.append(
-            [
-                difference.parameter.replace("_", " ") + (" shape" if difference.shape_only else ""),
-                with_interval(in_report_units(kind, float(difference.value[k])), in_report_units(kind, u), unit),
-                "" if np.isnan(difference.position[k]) else f"{position(difference.position[k])} mm",
-                _probability(comparison.probability(difference)),
-                "significant" if comparison.is_significant(difference) else "",
-            ]
-        )
-    volume = [
-        [
-            name,
-            length_text(figure.a, figure.a_interval),
-            length_text(figure.b, figure.b_interval),
-            length_text(figure.change, figure.interval),
-            "" if "rejected" in (comparison.a.fit, comparison.b.fit) else figure.verdict or "",
-        ]
-        for name, figure in (("largest", change.largest), ("root mean square", change.rms))
-    ]
-    effects = [
-        [
-            one.parameter,
-            length_text(one.largest, None),
-            length_text(one.rms, None),
-            "significant" if one.significant else "",
-        ]
-        for one in change.effects[:MOST_EFFECTS]
-    ]
-    notes = [f"no verdict: {change.no_verdict_because}"] if change.no_verdict_because else []
-    notes += [_of_before_and_after(note) for note in comparison.notes]
-    if comparison.only_in_a:
-        notes.append(f"only before: {', '.join(comparison.only_in_a)}")
-    if comparison.only_in_b:
-        notes.append(f"only after: {', '.join(comparison.only_in_b)}")
     return section(
         "comparison",
         "Before and after",
-        element(
-            "p",
-            element("strong", _verdict_of(change, (comparison.a.fit, comparison.b.fit))),
-            " The curves above show the earlier calibration dashed.",
-        ),
+        element("p", "A is the earlier calibration, B this one. The curves above show the earlier one dashed."),
         None if is_valid(comparison.a) else element("p", f"{headline(comparison.a, EARLIER)}.", class_="note"),
-        table("Error of the tool in the volume", ["", "before", "after", "change", ""], volume),
-        table("Error in the volume that one difference makes alone", ["Parameter", "largest", "rms", ""], effects),
-        table(
-            "Largest difference of each parameter, after less before",
-            ["Parameter", "difference (95 %)", "at", "probability by chance", ""],
-            rows,
-        ),
-        element(
-            "p",
-            f"Probability: that chance alone makes any of the {comparison.count} values differ so (Bonferroni); "
-            f"significant up to {comparison.limit:g}.",
-            class_="note",
-        ),
-        listed([sentence(note) for note in notes]) if notes else None,
+        html_of(comparison_blocks(comparison, change, "the earlier calibration", "this calibration")),
     )
-
-
-def _of_before_and_after(note: str) -> str:
-    """A note of a comparison of A and B, in the words of the page."""
-    for theirs, ours in (
-        ("A and B", "before and after"),
-        ("A is unverified", "the earlier calibration is unverified"),
-        ("B is unverified", "this calibration is unverified"),
-    ):
-        note = note.replace(theirs, ours)
-    return note
-
-
-def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:
-    figure = change.largest
-    if "rejected" in fits:
-        return "A fit is rejected: these figures do not show whether the machine has changed."
-    if math.isnan(figure.change):
-        return "Whether the error in the volume has changed is not known."
-    way = "smaller" if figure.change < 0.0 else "larger"
-    said = f"The largest error in the volume is {length_text(abs(figure.change), None)} {way} than before."
-    return f"{said} {figure.verdict.capitalize()}." if figure.verdict else said

@@ -346,7 +346,7 @@ def test_before_and_after_stand_side_by_side(evaluated: Path) -> None:
     before = sd.read_calibration("calibration.nc").functions["EXX"][1]
     (old,) = [trace for trace in drawn["figure-EXX"]["data"] if trace["name"] == "before"]
     np.testing.assert_allclose(old["y"], 1e3 * before, rtol=0.0, atol=5.1e-5)  # rounded to 0.1 nm
-    assert {"Before and after", "difference (95 %)"} <= {word.strip() for word in page.words}
+    assert {"Before and after", "B - A"} <= {word.strip() for word in page.words}
     assert (
         page.values()["before"]["calibration"]["provenance"]["run_sha256"]
         != page.values()["calibration"]["provenance"]["run_sha256"]
@@ -471,7 +471,7 @@ def test_rejected_calibration_ends_with_status_three_and_is_written(evaluated: P
         assert main(["report", *calibrations, "-o", "report.html"]) == 3
         page = Page(Path("report.html").read_text())
         if len(calibrations) == 2:
-            assert "A fit is rejected: these figures do not show whether the machine has changed." in page.text
+            assert "A fit is rejected, so that these figures do not show whether the machine has changed." in page.text
             assert "Improved" not in page.text
             assert "Worse" not in page.text
 
