@@ -1048,11 +1048,11 @@ class Misalignment:
         reflector: (2,) angles of the mirror a, b, rad
         laser: (2,) angles of the laser a, b, rad
         psd_zero: (2,) zero offset of the position sensing device, mm
-        distance_constant: What all distances read too much, mm.
-        beam_constants: What d1, d2, ... read too much, mm.
+        distance_constant: Constant error of all distances, mm.
+        beam_constants: Constant errors of d1, d2, ..., mm.
         lateral: (2,) offset of the beam's origin, mm
         roll: Of the head, rad.
-        gain: Tilts and spots read 1 + gain times themselves; beams stand at 1 + gain times their offsets.
+        gain: Relative error of tilts and spots; beams are at 1 + gain times their offsets.
         drift: Of the distances, mm/s.
         """
     def __repr__(self) -> str:
@@ -1062,12 +1062,12 @@ class Misalignment:
     @property
     def beam_constants(self) -> list[float]:
         """
-        What d1, d2, ... read too much, mm.
+        Constant errors of d1, d2, ..., mm.
         """
     @property
     def distance_constant(self) -> float:
         """
-        What all distances read too much, mm.
+        Constant error of all distances, mm.
         """
     @property
     def drift(self) -> float:
@@ -1077,7 +1077,7 @@ class Misalignment:
     @property
     def gain(self) -> float:
         """
-        Tilts and spots read 1 + gain times themselves; beams stand at 1 + gain times their offsets.
+        Relative error of tilts and spots; beams are at 1 + gain times their offsets.
         """
     @property
     def laser(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -2357,7 +2357,7 @@ class Fault:
     @property
     def size(self) -> float:
         """
-        What was read too much, mm or rad.
+        Error of the reading, mm or rad.
         """
     @property
     def standard_uncertainty(self) -> float:
@@ -2946,7 +2946,7 @@ class Recheck:
         """
 class LineDeviation:
     """
-    What a line of one run reads too much from end to end.
+    Deviation of the length of a line of one run from end to end.
     """
     def __repr__(self) -> str:
         ...

@@ -303,7 +303,7 @@ void bind_faults(py::module_& m) {
         field("row", &Fault::row, "Row of the measurement, from 0."), field("run", &Fault::run, "Of the line, from 0."),
         field("line", &Fault::line, "Such as \"ppp\"."), field("point", &Fault::point, "On the line, from 0."),
         field("channel", &Fault::channel, "\"distance\", ..."),
-        field("size", &Fault::size, "What was read too much, mm or rad."),
+        field("size", &Fault::size, "Error of the reading, mm or rad."),
         field("standard_uncertainty", &Fault::standard_uncertainty, "Of the size."),
         field("chi_square_gain", &Fault::chi_square_gain, "How much chi-square falls without it."));
     bind_record(

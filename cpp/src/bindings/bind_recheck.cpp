@@ -133,7 +133,7 @@ void bind_rechecking(py::module_& m) {
 
 void bind_recheck(py::module_& m) {
     bind_rechecking(m);
-    bind_record(m, "LineDeviation", "What a line of one run reads too much from end to end.",
+    bind_record(m, "LineDeviation", "Deviation of the length of a line of one run from end to end.",
                 field("run", &LineDeviation::run, "Of the line, from 0."),
                 field("line", &LineDeviation::line, "Such as \"ppp\"."),
                 field("deviation", &LineDeviation::deviation, "Read minus predicted, mm; of beams their mean."),

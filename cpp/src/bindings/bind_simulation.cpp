@@ -22,12 +22,12 @@ static void bind_simulation_options(py::module_& m) {
         field("reflector", &Misalignment::reflector, "(2,) angles of the mirror a, b, rad"),
         field("laser", &Misalignment::laser, "(2,) angles of the laser a, b, rad"),
         field("psd_zero", &Misalignment::psd_zero, "(2,) zero offset of the position sensing device, mm"),
-        field("distance_constant", &Misalignment::distance_constant, "What all distances read too much, mm."),
-        field("beam_constants", &Misalignment::beam_constants, "What d1, d2, ... read too much, mm."),
+        field("distance_constant", &Misalignment::distance_constant, "Constant error of all distances, mm."),
+        field("beam_constants", &Misalignment::beam_constants, "Constant errors of d1, d2, ..., mm."),
         field("lateral", &Misalignment::lateral, "(2,) offset of the beam's origin, mm"),
         field("roll", &Misalignment::roll, "Of the head, rad."),
         field("gain", &Misalignment::gain,
-              "Tilts and spots read 1 + gain times themselves; beams stand at 1 + gain times their offsets."),
+              "Relative error of tilts and spots; beams are at 1 + gain times their offsets."),
         field("drift", &Misalignment::drift, "Of the distances, mm/s."));
 
     bind_options<Noise, 5>(m, "Noise", "Standard deviations of an independent Gaussian per reading.", &check_noise,

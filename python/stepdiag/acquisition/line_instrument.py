@@ -215,7 +215,7 @@ def line_instrument(source: str, known: Known, *, timeout: float, warn: Callable
         return LineInstrument(lambda: ProgramOutput(name, arguments), known, timeout=timeout)
     host, port = _address(source)
     if not _is_loopback(host):
-        warn(f"warning: {source}: not on this computer: anybody on the way can change what is read")
+        warn(f"warning: {source}: not on this computer: anybody on the way can change the readings")
     return LineInstrument(lambda: Connection(source, host, port, timeout), known, timeout=timeout)
 
 

@@ -75,7 +75,7 @@ def volume(
     error without each axis and parameter.
 
     95 % intervals and the verdict need the covariance, which evaluate writes to netCDF files. The
-    verdict is within, not within, or cannot be decided (ISO 14253-1, one-sided, 95 %). The exit code
+    verdict is within, not within, or undecided (ISO 14253-1, one-sided, 95 %). The exit code
     is 0 for each of them, and 3 if the fit of the calibration is rejected; programs read --json.
     """
     from stepdiag.calibration.volume import volume

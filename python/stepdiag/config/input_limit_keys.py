@@ -61,10 +61,10 @@ def _limit(meaning: str, inner: Range | None, outer: Range | None) -> Any:
 
 
 class InputLimitsSection(Section):
-    """Limits of what is put in, each `{inner = [LOW, HIGH], outer = [LOW, HIGH]}`, both ends included. Beyond `outer`
+    """Limits of plausible inputs, each `{inner = [LOW, HIGH], outer = [LOW, HIGH]}`, both ends included. Beyond `outer`
     an input is an error, which says what the number looks like. Beyond `inner` it is a warning, and the fit is at best
     doubtful. A range that is not stated is the default one; without any there is no such limit. A temperature that is
-    0, 85 or -127 in every row is an error unless it is within `inner`: a sensor that says nothing."""
+    0, 85 or -127 in every row is an error unless it is within `inner`: a sensor without a value."""
 
     scale_temperature_c: Limits = _limit("Of the scales, °C: columns and `axes_c`.", (10.0, 40.0), (-10.0, 60.0))
     part_temperature_c: Limits = _limit("Of a workpiece, °C, where a file states it.", (10.0, 40.0), (-10.0, 60.0))

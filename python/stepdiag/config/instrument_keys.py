@@ -25,8 +25,7 @@ class InstrumentSection(Section):
 
     scale_ppm: Scale = key(
         f"a number from -{LARGEST_SCALE:g} to {LARGEST_SCALE:g}, in ppm",
-        "What all distances read too much, relative: evaluations divide distances by 1 + this; `simulate` makes such "
-        "distances.",
+        "Relative error of all distances: evaluations divide distances by 1 + this; `simulate` makes such distances.",
         0.0,
     )
     u_scale_ppm: Uncertainty | None = key(

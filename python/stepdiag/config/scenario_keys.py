@@ -143,7 +143,7 @@ class PlanSection(Section):
     )
     block: Annotated[int, Field(ge=1, le=LARGEST_STEPS)] = key(
         f"an integer from 1 to {LARGEST_STEPS}",
-        "So many steps of an axis follow each other before the next axis moves. A larger block makes straightness, "
+        "Steps of an axis that follow each other before the next axis moves. A larger block makes straightness, "
         "angles and squareness better known, and needs a mirror that is so many times as large (docs/plans.md).",
         1,
     )
@@ -196,17 +196,20 @@ class MisalignmentKeys(Section):
         ANGLES, "Tilt (a, b) of the beam and the sensor's axes about local x and y.", (0.0, 0.0)
     )
     psd_zero_mm: Pair = key(
-        "two lengths in mm", "What the position sensing device reads for a centred spot.", (0.0, 0.0)
+        "two lengths in mm", "Reading of the position sensing device for a centred spot.", (0.0, 0.0)
     )
-    distance_constant_mm: Length = key("a length in mm", "What every distance of a line reads too much.", 0.0)
+    distance_constant_mm: Length = key("a length in mm", "Constant error of all distances of a line.", 0.0)
     beam_constants_um: tuple[Length, ...] | None = key(
-        "a list of lengths in µm, one for each beam", "And each of d1, d2, ... by itself.", None, [0.0, 1.0, -1.0]
+        "a list of lengths in µm, one for each beam",
+        "The same of each of d1, d2, ... by itself.",
+        None,
+        [0.0, 1.0, -1.0],
     )
     lateral_mm: Pair = key("two lengths in mm", "Offset of the beam's origin along local x and y.", (0.0, 0.0))
     roll_urad: Angle = key("an angle below 0.1 rad, in µrad", "Roll of the head about its beam.", 0.0)
     gain: Annotated[float, Field(ge=-0.5, le=0.5)] = key(
         "a number from -0.5 to 0.5",
-        "Tilts read 1 + gain times themselves; `psd`: spots; `multi_beam`: the beams stand at 1 + gain times their "
+        "Relative error of tilts; `psd`: of spots; `multi_beam`: the beams are at 1 + gain times their "
         "offsets (of a traced head they stand where its design says).",
         0.0,
     )

@@ -24,19 +24,19 @@ class SetupUncertaintyKeys(Section):
 
     reflector_urad: Spread | None = _uncertain("Tilts a and b of the mirror about local x and y, each.", 300.0)
     laser_urad: Spread | None = _uncertain("Tilts a and b of the beam and the sensor's axes, each.", 100.0)
-    psd_zero_mm: Spread | None = _uncertain("Layout `psd`: what a centred spot reads along x and y, each.", 0.1)
-    distance_constant_mm: Spread | None = _uncertain("What every distance of a line reads too much.", 0.01)
+    psd_zero_mm: Spread | None = _uncertain("Layout `psd`: reading of a centred spot along x and y, each.", 0.1)
+    distance_constant_mm: Spread | None = _uncertain("Constant error of all distances of a line.", 0.01)
     beam_constants_um: Spread | None = _uncertain("Layout `multi_beam`: and each of d1, d2, ... by itself.", 1.0)
     lateral_mm: Spread | None = _uncertain("Offset of the beam's origin along local x and y, each.", 0.5)
     roll_urad: Spread | None = _uncertain("Roll of the head about its beam.", 1000.0)
     gain: Spread | None = _uncertain(
-        "Tilts (spots; the beams' offsets) read 1 + gain times themselves; not of a traced layout `multi_beam`.", 0.002
+        "Relative error of tilts (of spots; of the beams' offsets); not of a traced layout `multi_beam`.", 0.002
     )
     drift_um_per_h: Spread | None = _uncertain(
         "Drift of all distances, linear in time since a line's first reading; needs `plan.seconds_per_reading`.", 0.5
     )
     scale_um: Spread | None = _uncertain(
-        "What distances read too much at a line's last point: the uncertainty of a length standard. Along a scale "
+        "Error of the distances at a line's last point: the uncertainty of a length standard. Along a scale "
         "line it grows with the travel. In `[uncertainty]` itself it is that of the scale lines, each by itself, and "
         "of no others.",
         0.2,

@@ -65,7 +65,7 @@ class Agreement:
 
     chi_square: FloatArray  # (n,): of each error vector, by the covariance of the calibration there
     stated_rms: float  # of the vectors' standard uncertainty, mm
-    found_rms: float  # of what is left, mm
+    found_rms: float  # of the remaining error, mm
 
     @property
     def covered(self) -> float:

@@ -72,7 +72,7 @@ def node_note(outcomes: list[LoopOutcome]) -> Iterator[str]:
                 f"{outcome.case.name}: largest error at any of the {count:,} nodes, calculated: "
                 f"{before * UM:.4g} µm before, {after * UM:.3g} µm after: {before / after:,.0f} times smaller"
             )
-    yield "Between nodes what is left is the truth's departure from straight lines between them: more steps resolve it."
+    yield "Between nodes the remaining error is the truth's departure from straight lines: more steps resolve it."
 
 
 def screw_note(outcome: LoopOutcome) -> Iterator[str]:
@@ -103,7 +103,7 @@ def noise_note(outcome: LoopOutcome, repeated: dict[str, Agreement] | None) -> I
         f"Noise: {DISTANCE_NOISE * UM:g} µm of each of three beams, {RADIUS:.4g} mm from their middle, which is "
         f"{TILT_NOISE * MICRO:g} µrad of tilt"
     )
-    yield f"{'':<44}{'what is left':>13}{'stated':>10}{'chi-square':>13}{'in 95 %':>10}"
+    yield f"{'':<44}{'remaining':>13}{'stated':>10}{'chi-square':>13}{'in 95 %':>10}"
     yield f"{'':<44}{'rms, µm':>13}{'rms, µm':>10}{'per freedom':>13}{'regions':>10}"
     rows = [(f"this run, {WORDS[kind]}", found) for kind, found in outcome.agreement.items()]
     rows += [(f"repetitions, {WORDS[kind]}", found) for kind, found in (repeated or {}).items()]

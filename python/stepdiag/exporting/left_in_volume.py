@@ -1,7 +1,7 @@
 """What an export leaves of the error in the volume, with its compensation applied as the controller applies it.
 
 The controller sends the motors to m(p) when p is commanded; e is the error of the functional point by
-the exact pose. What is left is m + e(m) - p, referred to home, as every error of docs/volume.md is.
+the exact pose. The remaining error is m + e(m) - p, referred to home, as every error of docs/volume.md is.
 """
 
 from collections.abc import Callable, Sequence
@@ -74,7 +74,7 @@ def what_is_left(calibration: Calibration, left: LeftInVolume | None) -> list[st
     if left is not None:
         return left.sentences()
     missing = ", ".join(undetermined_of(calibration, [*FUNCTIONS, *SQUARENESSES]))
-    return [f"what is left in the volume is not known, because not determined: {missing}"]
+    return [f"the remaining error in the volume is not known, because not determined: {missing}"]
 
 
 def volume_grid_of(errors: ErrorMap, volume: FloatArray, fewest: int = 2) -> tuple[FloatArray, FloatArray]:

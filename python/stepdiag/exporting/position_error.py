@@ -73,7 +73,7 @@ def position_error(calibration: Calibration, output: Path, options: ExportOption
         f"rows: {len(kept)} of {len(nodes)} nodes; the table deviates from the exact error on the line by at most "
         f"{loss * 1e3:.2g} µm",
         *missing,
-        f"left out: all but {', '.join(acting) or 'nothing'}, and of the rotations what they do away from the line",
+        f"left out: all but {', '.join(acting) or 'nothing'}, and the effect of the rotations away from the line",
         *what_is_left(calibration, left),
     ]
     more = {"axis": AXES[axis], "depends_on": AXES[by], "at_mm": lengths(at), "deviation_um": f"{loss * 1e3:.4g}"}

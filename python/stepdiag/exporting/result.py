@@ -85,7 +85,7 @@ def csv_leading(
 ) -> dict[str, str]:
     """Leading lines of a CSV file: its format, the machine, and of the report what a table needs beside it."""
     said = dict(line.split(": ", 1) for line in lines if line.startswith(LEADING))
-    figures = [line for line in lines if "error in the volume" in line or line.startswith("what is left")]
+    figures = [line for line in lines if "error in the volume" in line or line.startswith("the remaining error")]
     return {
         "format": format_,
         "fit": calibration.fit or "",

@@ -98,7 +98,7 @@ def export(
 
 
 def write_export(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
-    """Write as `export` does, and return also what is compensated and what is left."""
+    """Write as `export` does, and return also what is compensated and the remaining error."""
     export = _prepare(calibration, to, output, options)
     if to == "linuxcnc-comp":
         make_folder(output)

@@ -56,7 +56,7 @@ def reason_text(reason: FitReason) -> str:
         case "misfit" if reason.channel:
             return f"noise: {_scatter(reason)}"
         case "misfit" | "no_misfit":
-            return f"the noise is about {noise} what is stated"
+            return f"the noise is about {noise} the stated one"
         case "scaled":
             return (
                 f"all uncertainties were multiplied by {noise.removesuffix(' times')}, to match the readings' scatter"
@@ -75,11 +75,13 @@ def reason_text(reason: FitReason) -> str:
             )
         case "fault_cost":
             return (
-                f"what was left out or freed for faults makes {kind_of(reason.parameter)} ({reason.parameter}) "
+                f"leaving out or freeing readings for faults makes {kind_of(reason.parameter)} ({reason.parameter}) "
                 f"{reason.value:.3g} times as uncertain (at most {reason.limit:g} times is accepted)"
             )
         case "undetermined":
-            return f"what was left out or freed for faults leaves {reason.parameter} undetermined, wholly or in part"
+            return (
+                f"leaving out or freeing readings for faults leaves {reason.parameter} undetermined, wholly or in part"
+            )
         case "mistake":
             return mistake_reason(reason.parameter)
         case "implausible_input":

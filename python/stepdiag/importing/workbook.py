@@ -125,7 +125,7 @@ class _Table:
         places = " and ".join(dict.fromkeys(_place(*cell) for cell in (self._last_row, self._last_column)))
         raise InvalidArgument(
             f'sheet "{self.title}" reaches to {places}, {rows:,} rows by {columns:,} columns; '
-            f"at most {MOST_CELLS:,} cells are read: clear what is far from the readings"
+            f"at most {MOST_CELLS:,} cells are read: clear cells that are far from the readings"
         )
 
 

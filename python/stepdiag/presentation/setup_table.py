@@ -65,7 +65,7 @@ def setup_table(
         places = "every line" if everywhere else ", ".join(dict.fromkeys(e.line for e in known))
         widths = ", ".join(dict.fromkeys(f"{e.prior / native:g}" for e in known))
         name = quantity.replace("_", " ")
-        notes.append(f"{name}: the readings add almost nothing to what was known ({widths} {unit}) on {places}")
+        notes.append(f"{name}: the readings add almost nothing to the prior ({widths} {unit}) on {places}")
     return rows, notes
 
 

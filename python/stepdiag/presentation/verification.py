@@ -103,8 +103,8 @@ def recheck_blocks(judged: Judged, measurement: Measurement, volume: VolumeError
     headline, why = {
         "unexplained": (
             "the machine has changed, unexplained",
-            f"{_rest(found.left_out)} go neither with the calibration nor with a change of low order; it has changed "
-            f"otherwise, or readings are wrong (chi-square {found.fit_chi_square:.1f} with "
+            f"{_rest(found.left_out)} agree neither with the calibration nor with a change of low order; it "
+            f"has changed in another way, or readings are wrong (chi-square {found.fit_chi_square:.1f} with "
             f"{found.fit_degrees_of_freedom} degrees of freedom, by chance larger in {_percent(found.fit_probability)} "
             f"of cases, limit {100.0 * judged.alpha:g} %)",
         ),

@@ -82,7 +82,7 @@ def place_of_largest(found: VolumeErrors) -> str:
 def why_not_known(found: VolumeErrors) -> str:
     """Which parameters are missing for the error in the volume; without a full stop."""
     names = dict.fromkeys(name for axis in "XYZ" for name in found.missing.get(axis, ()))
-    return f"not known, because it needs what is not determined: {', '.join(names)}"
+    return f"not known, because it needs parameters that are not determined: {', '.join(names)}"
 
 
 def _by_missing(missing: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -29,7 +29,7 @@ _KEYS: Final = {
 
 @dataclass(frozen=True)
 class KnownInstrument:
-    """`scale`: what all distances read too much, relative; `scale_uncertainty`: its standard uncertainty, None where
+    """`scale`: relative error of all distances; `scale_uncertainty`: its standard uncertainty, None where
     none is stated. `air`: standard uncertainties of the air, by quantity, as far as they are stated."""
 
     scale: float = 0.0

@@ -181,7 +181,7 @@ def test_change_that_is_not_of_low_order_is_unexplained(folder: Path, capsys: py
     capsys.readouterr()
     assert main(["recheck", "calibration.nc", "short.toml", "screw.csv", "--update", "updated.nc"]) == 3
     said, warned = capsys.readouterr()
-    assert said.startswith("the machine has changed, unexplained: the readings go neither with the calibration nor ")
+    assert said.startswith("the machine has changed, unexplained: the readings agree neither with the calibration nor ")
     rows = [line for line in said.splitlines() if "times its standard uncertainty" in line]
     assert len(rows) == 5
     assert all(row.startswith("  distance at line ") for row in rows)

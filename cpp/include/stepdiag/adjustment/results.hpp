@@ -93,7 +93,7 @@ struct Fault {
     std::string line;
     int point;
     std::string channel;
-    double size;                  // what was read too much, mm or rad; by a factor where the line is farthest
+    double size;                  // error of the reading, mm or rad; by a factor where the line is farthest
     double standard_uncertainty;  // of the size
     double chi_square_gain;       // how much chi-square falls without it
 };

@@ -22,17 +22,17 @@ inline constexpr PriorUncertainty usual_drift = 5e-3 / 3600.0;  // mm/s: 5 um/h
 enum class SetupQuantity {
     reflector,          // (a, b): mirror normal R_tool F Exp(a, b, 0) z
     laser,              // (a, b): sensor axes F Exp(a, b, 0)
-    distance_constant,  // what every distance reads too much
-    beam_constants,     // layout multi_beam: what each of d1 ... dn reads too much; of an adjustment: d2 ... against d1
-    psd_zero,           // layout psd: what a centred spot reads
+    distance_constant,  // constant error of all distances
+    beam_constants,     // layout multi_beam: constant errors of d1 ... dn; of an adjustment: of d2 ... relative to d1
+    psd_zero,           // layout psd: reading of a centred spot
     lateral,            // the beam's origin beside its nominal place, along local x and y
     roll,               // of the head about its beam: sensor axes F Exp(a, b, 0) Exp(0, 0, roll)
-    gain,               // tilts read 1 + gain times themselves; layout psd: spots; multi_beam: the beams' offsets
-    drift,              // distances read too much by drift times the time since the set-up's first reading
+    gain,               // relative error of tilts; layout psd: of spots; multi_beam: of the beams' offsets
+    drift,              // of distances, linear in time since the set-up's first reading
     // No unknowns of an adjustment:
-    scale_length,  // what the distances of the line's last point read too much: a length standard's error;
+    scale_length,  // error of the distances of the line's last point: that of a length standard;
                    // the inner points of a scale line by their travel
-    scale_factor,  // distances read too much by this times their travel from the line's first point
+    scale_factor,  // error of distances, relative to their travel from the line's first point
 };
 inline constexpr int setup_quantity_count = 11;
 inline constexpr int adjusted_quantity_count = 9;  // the first ones
@@ -66,23 +66,23 @@ inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_qua
     {"laser", "laser_urad", "laser", "laser", "rad", "urad",
      "tilt (a, b) of the beam and the sensor's axes", free_unknown, 500e-6, "ab", {}, false, free_unknown, 2e-3},
     {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um",
-     "what every distance of a line reads too much", free_unknown, free_unknown},
+     "constant error of all distances of a line", free_unknown, free_unknown},
     {"beam_constants", "beam_constants_um", "beam constant", "beam", "mm", "um",
-     "what d2, d3, ... read too much, against d1", free_unknown, free_unknown, "", HeadLayout::multi_beam, true},
+     "constant errors of d2, d3, ... relative to d1", free_unknown, free_unknown, "", HeadLayout::multi_beam, true},
     {"psd_zero", "psd_zero_mm", "PSD zero", "psd zero", "mm", "um",
-     "what a centred spot reads", free_unknown, free_unknown, "xy", HeadLayout::psd, false, free_unknown, 10.0},
+     "reading of a centred spot", free_unknown, free_unknown, "xy", HeadLayout::psd, false, free_unknown, 10.0},
     {"lateral", "lateral_mm", "lateral", "lateral", "mm", "mm",
      "the beam's origin beside its nominal place, along local x and y", 1.0, 1.0, "xy", {}, false, 1e3},
     {"roll", "roll_urad", "roll", "roll", "rad", "urad",
      "roll of the head about its beam", 20e-3, 20e-3, "", {}, false, 1.0},
     {"gain", "gain", "gain", "gain", "1", "ppm",
-     "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, 0.01, "", {}, false, 1.0},
+     "relative error of tilts (of spots; of the beams' offsets)", 0.01, 0.01, "", {}, false, 1.0},
     {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h",
-     "what distances read too much for every hour since the set-up's first reading", usual_drift, usual_drift},
+     "error that distances gain in every hour since the set-up's first reading", usual_drift, usual_drift},
     {"scale_length", "scale_um", "scale length", "scale length", "mm", "um",
-     "what the distances of the line's last point read too much", fixed_unknown, fixed_unknown},
+     "error of the distances of the line's last point", fixed_unknown, fixed_unknown},
     {"scale_factor", "scale_ppm", "scale factor", "scale factor", "1", "ppm",
-     "what distances read too much, by their travel", fixed_unknown, fixed_unknown},
+     "error of distances, relative to their travel", fixed_unknown, fixed_unknown},
 }};
 // clang-format on
 

@@ -219,7 +219,7 @@ def _faults(details: FitDetails) -> Markup | None:
     return markup(
         element("h3", "Faults of readings"),
         element("p", "Rows of one number are alternatives: the readings do not distinguish them."),
-        value_table("Faults of readings", ["Fault", "What it may be", "reads too much", "What was done"], rows),
+        value_table("Faults of readings", ["Fault", "What it may be", "error", "What was done"], rows),
     )
 
 

@@ -361,7 +361,9 @@ def test_what_is_not_determined_is_said_where_it_counts(here: Path) -> None:
     page = page_of(calibration=Path("short.nc"))
     for sentence in sd.read_calibration("short.nc").undetermined:
         assert sentence[1:] in page.text
-    assert "The largest error is not known, because it needs what is not determined: slope of EXX" in page.text
+    assert (
+        "The largest error is not known, because it needs parameters that are not determined: slope of EXX" in page.text
+    )
     assert "The slope of EXX, the slope of EYY, the slope of EZZ." in page.text
 
 
