@@ -9,7 +9,7 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.parameters import KINDS, kind_of
-from stepdiag.planning.fault_control import extensions, tells_all
+from stepdiag.planning.fault_control import distinguishes_all, extensions
 from stepdiag.planning.observation import not_measured, observe
 from stepdiag.presentation.blocks import text_of
 from stepdiag.presentation.fault_control import control_blocks, extension_blocks
@@ -114,7 +114,7 @@ def test_standard_plan_tells_no_distance_from_its_twin_and_more_of_it_tells_all(
     own = {(c.kind, c.channel): c for c in observe(known)[1].reliability}
     for kind in ("reading", "slip"):
         assert own[kind, "distance"].twins == own[kind, "distance"].count
-    assert not tells_all([*own.values()])
+    assert not distinguishes_all([*own.values()])
     faces, twice = extensions(known)
     assert "pp0, p0p, 0pp" in faces.name
     assert "twice" in twice.name
@@ -191,4 +191,4 @@ def test_evaluate_says_on_demand_what_would_have_been_found(scenario: str, capsy
 def test_plan_that_tells_all_needs_nothing_more() -> None:
     known = parse_scenario(FACES.replace("steps = 2", "steps = 10\nrepeats = 2")).known
     own = observe(known)[1].reliability
-    assert not [row for row in extension_blocks(own, list(extensions(known))) if tells_all(own)]
+    assert not [row for row in extension_blocks(own, list(extensions(known))) if distinguishes_all(own)]
