@@ -92,5 +92,5 @@ def draw_noise(axes: Axes, outcome: LoopOutcome, repeated: dict[str, Agreement] 
     axes.set_xlim(0.0, 20.0)
     axes.set_xlabel("chi-square of the error vector")
     axes.set_ylabel("share of points with a smaller value")
-    axes.set_title("Noise: the remaining error in units of its stated uncertainty")
+    axes.set_title("Noise: what is left, by the calibration's own uncertainty")
     legend_below(axes)
