@@ -88,10 +88,12 @@ class Campaign:
         """Run a command undisturbed: alone, beside an old result, and with the inputs of the old one."""
         self.old[number] = self.undisturbed(number, "older", {}, worker)[0]
         new, calls, seconds = self.undisturbed(number, "inputs", {}, worker)
-        again, calls_over, _ = self.undisturbed(number, "inputs", self.old[number], worker)
         self.new[number] = new
         self.seconds[number] = seconds
         self.calls[number, False] = calls
+        if self.commands[number].in_book:  # where nothing replaces an old file
+            return
+        again, calls_over, _ = self.undisturbed(number, "inputs", self.old[number], worker)
         if again:
             assert again == new, f"{self.commands[number].arguments}: another result beside an old one"
             self.calls[number, True] = calls_over
@@ -152,13 +154,52 @@ class Campaign:
         return self.written(case), int(case.with_suffix(".calls").read_text()), done.seconds
 
     def written(self, case: Path) -> dict[str, bytes]:
-        """The files that are not inputs."""
-        inputs = {path.name for path in (self.folder / "inputs").iterdir()}
-        return {
+        """The files that are not inputs. Of a book those that count: no index, records and names that are taken."""
+        inputs = {str(path.relative_to(self.folder / "inputs")) for path in (self.folder / "inputs").rglob("*")}
+        found = {
             str(path.relative_to(case)): path.read_bytes()
             for path in sorted(case.rglob("*"))
             if path.is_file() and str(path.relative_to(case)) not in inputs
         }
+        return {
+            name: content
+            for name, content in found.items()
+            if not (name.startswith("book/") and ("sqlite" in name or "/records/" in name or not content))
+        }
+
+    def wrong_with_book(self, case: Path) -> str:
+        """What is lost of a book: a file that was there, a record, the use of it. Empty: nothing."""
+        from processes import in_child
+
+        from stepdiag.book.records import read
+        from stepdiag.cli import main
+
+        contents = {path.read_bytes() for path in (case / "book").rglob("*") if path.is_file()}
+        for path in (self.folder / "inputs" / "book").rglob("*"):
+            if path.is_file() and "sqlite" not in path.name and path.read_bytes() not in contents:
+                return f"{path.name} is gone"
+        unread: list[str] = []
+        for path in (case / "book").rglob("records/*.json"):
+            try:
+                read(path)
+            except ValueError as error:
+                unread.append(str(error))
+        if unread:
+            return f"a record is damaged: {unread[0]}"
+        for words in (
+            "book list --book book",
+            "book show M --book book",
+            "evaluate --machine M --book book -o next.nc",
+        ):
+
+            def use(words: list[str] = words.split()) -> int:
+                os.chdir(case)
+                return main(words)
+
+            done = in_child(use, case.with_suffix(".said"))
+            if done.status not in (0, 3):
+                return f"afterwards `stepdiag {words}` ends with {done.status}: {done.said[-200:]}"
+        return ""
 
     # --- cases ------------------------------------------------------------------------------------------------------
     def of_command(self, number: int) -> Iterator[Case]:
@@ -205,6 +246,10 @@ class Campaign:
             outcome = in_child(self.work(case.command, place, kind, case.call, number), said)
         found = self.written(place)
         verdict = self.verdict(case, outcome, old, found)
+        if self.commands[case.command].in_book and not verdict.startswith("lost"):
+            wrong = self.wrong_with_book(place)
+            if wrong:
+                return [(f"lost: {wrong}", f"{self.shown(case)} {outcome.status} {outcome.said[:700]}")]
         if verdict.startswith("lost") or outcome.status in (0, 3):
             return [(verdict, f"{self.shown(case)} {outcome.status} {outcome.said[:700]}")]
         return [(self.continued(case, place, found, verdict), self.shown(case))]
@@ -295,9 +340,12 @@ class Campaign:
             give_up_privileges()
             return work()
 
-        place.chmod(0o555)
+        folders = [place, *(path for path in place.rglob("*") if path.is_dir())]
+        for folder in folders:
+            folder.chmod(0o555)
         outcome = in_child(unprivileged, said)
-        place.chmod(0o755)
+        for folder in folders:
+            folder.chmod(0o755)
         found = self.written(place)
         sound = outcome.status == 2 and outcome.is_one_line and not found
         what = f"{self.shown(case)} {outcome.status} {outcome.said[-300:]}"
@@ -397,6 +445,8 @@ def part(campaign: Campaign, worker: int, arguments: argparse.Namespace, results
             file.flush()
 
         cases = [case for k, case in enumerate(campaign.others(arguments.short)) if k % arguments.jobs == worker]
+        if arguments.command:
+            cases = []  # of commands alone
         if arguments.short:
             cases = [case for case in cases if case.kind in (INSTRUMENT, CLIENT) or chance.random() < 0.5 / SHORT]
         numbers = range(0, len(campaign.commands), 3 if arguments.short else 1)

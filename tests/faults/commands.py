@@ -11,12 +11,14 @@ from pathlib import Path
 class Command:
     """A command line, and the files and folders that it writes.
 
-    `resumed`: its further arguments after an interruption. `kept`: files that stay for that, wherever it ends."""
+    `resumed`: its further arguments after an interruption. `kept`: files that stay for that, wherever it ends.
+    `in_book`: it changes the machine book of the inputs."""
 
     arguments: str
     writes: tuple[str, ...]
     resumed: str | None = None
     kept: tuple[str, ...] = ()
+    in_book: bool = False
 
     @property
     def words(self) -> list[str]:
@@ -62,6 +64,19 @@ COMMANDS = (
     Command("acquire --from-raw out.raw.jsonl -o out.csv", ("out.csv",)),
     Command("init -o new", ("new",)),
     Command("head show beam_and_psd -o out.svg", ("out.svg",)),
+    *(
+        Command(f"{arguments} --book book", (), in_book=True)
+        for arguments in (
+            "book new Other",
+            "book add --machine M again.csv",
+            "book add --machine M mapped.toml",
+            "book remove --machine M calibration.nc",
+            "book reindex",
+            "evaluate --machine M",
+            "export --machine M --to linuxcnc-comp --accept-rejected --incomplete",
+            "report --machine M -o report.html",
+        )
+    ),
 )
 
 
@@ -89,6 +104,10 @@ def make_inputs(folder: Path, scenario: str, main: Callable[[list[str]], int]) -
     ):
         assert main(line.split()) in (0, 3), line
     stepdiag.read_scenario("scenario.toml").machine().errors.write("map.csv")
+    with_map = scenario.replace("[machine.random]\nseed = 7", 'errors = "map.csv"')
+    (folder / "mapped.toml").write_text(with_map.replace("[machine.random]\nseed = 8", 'errors = "map.csv"'))
+    assert main(["book", "new", "M", "--book", "book"]) == 0
+    assert main("book add --book book --machine M scenario.toml run.csv calibration.nc".split()) == 0
     rows = [line.split(",") for line in Path("run.csv").read_text().splitlines() if not line.startswith("#")]
     Path("sheet.csv").write_text("\n".join(";".join(row).replace(".", ",") for row in rows))
     book = openpyxl.Workbook()

@@ -43,8 +43,9 @@ BELOW: dict[str, set[str]] = {
     "figures": {"planning"},
     "selftest": {"uncertainty"},
     "presentation": {"figures", "acquisition", "positions", "evaluation", "exporting", "selftest"},
+    "book": {"presentation"},
     "demo": {"presentation", "program", "linuxcnc", "twin"},
-    "cli": {"demo", "progress", "importing"},
+    "cli": {"demo", "progress", "importing", "book"},
     # What the package shows to specialists.
     "optics": {"head"},
     "methods": {"planning"},

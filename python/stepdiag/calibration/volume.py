@@ -503,8 +503,13 @@ def _verdict(
         return None, f"not determined: {', '.join(lacking)}"
     if bounds is None:
         return None, "the calibration has no covariance"
+    return decided(bounds, limit), ""
+
+
+def decided(bounds: Interval, limit: float) -> Verdict:
+    """Whether the largest error is within a limit, by its `VolumeErrors.bounds`, all in one unit."""
     above, below = bounds
-    return ("within" if below <= limit else "not within" if above > limit else "undecided"), ""
+    return "within" if below <= limit else "not within" if above > limit else "undecided"
 
 
 def _between_nodes(calibration: Calibration, tool: FloatArray, point: FloatArray, error: FloatArray) -> float:

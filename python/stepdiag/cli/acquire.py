@@ -10,8 +10,9 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.settling import Settling
+from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.interrupts import unwinding
-from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, made_of, options_of, out_file, tell, tell_inputs
+from stepdiag.cli.options import PATH, Writes, in_flags, made_of, options_of, out_file, tell, tell_inputs
 from stepdiag.cli.terminal import plain
 from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
@@ -50,7 +51,8 @@ class _Terminal:
 
 
 @click.command(
-    cls=Grouped,
+    cls=OfMachine,
+    makes={"output": Kept("runs", ".csv")},
     groups={
         "Instrument": ["source", "axes", "sign", "zero", "timeout"],
         "When to read": ["trigger", "start", "wait_timeout", "retries"],

@@ -6,11 +6,11 @@ from pathlib import Path
 import click
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
+from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.options import (
     NOT_TO_BE_TRUSTED,
     PATH,
     Command,
-    Grouped,
     Writes,
     input_warnings,
     is_untrusted,
@@ -25,7 +25,7 @@ from stepdiag.progress import Progress
 
 _WORDS = {
     "customer": "Who receives the report.",
-    "machine": "Maker and type of the machine.",
+    "machine_type": "Maker and type of the machine.",
     "serial_number": "Serial number of the machine.",
     "operator": "Who measured.",
     "instrument": "Instrument, with its serial number.",
@@ -42,7 +42,9 @@ def _header_options(command: Command) -> Command:
 
 
 @click.command(
-    cls=Grouped,
+    cls=OfMachine,
+    makes={"output": Kept("reports"), "functional_point": Kept("reports")},
+    about=True,
     groups={
         "Output": ["output", "functional_point", "as_json"],
         "Workpiece": ["workpiece_expansion", "workpiece_temperature"],
@@ -184,7 +186,11 @@ def _write_page(
     return contents.before
 
 
-@click.command(epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv")
+@click.command(
+    cls=OfMachine,
+    makes={"output": Kept("reports")},
+    epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv",
+)
 @click.argument("a", type=PATH)
 @click.argument("b", type=PATH)
 @click.option(
@@ -252,7 +258,11 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         context.exit(NOT_TO_BE_TRUSTED)
 
 
-@click.command(epilog="\b\nExample: stepdiag verify calibration.nc scenario.toml other_lines.csv")
+@click.command(
+    cls=OfMachine,
+    other_run=True,
+    epilog="\b\nExample: stepdiag verify calibration.nc scenario.toml other_lines.csv",
+)
 @click.argument("calibration", type=PATH)
 @click.argument("scenario", type=PATH)
 @click.argument("run", type=PATH)
@@ -320,7 +330,12 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
         context.exit(NOT_TO_BE_TRUSTED)
 
 
-@click.command(epilog="\b\nExample: stepdiag recheck calibration.nc short.toml monday.csv --update monday.nc")
+@click.command(
+    cls=OfMachine,
+    makes={"update": Kept("calibrations")},
+    other_run=True,
+    epilog="\b\nExample: stepdiag recheck calibration.nc short.toml monday.csv --update monday.nc",
+)
 @click.argument("baseline", type=PATH)
 @click.argument("scenario", type=PATH)
 @click.argument("run", type=PATH)

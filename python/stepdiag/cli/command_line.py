@@ -32,10 +32,10 @@ COMMANDS: Final = {
     "plan": ("plan", "Choose the plan for the available time."),
     "uncertainty": ("uncertainty", "Report how uncertain a calibration would be."),
     "study": ("study", "Report the uncertainty over a grid of scenarios."),
-    "nc": ("nc", "Write the measuring program for a controller."),
+    "nc": ("export", "Write the measuring program for a controller."),
     "acquire": ("acquire", "Record readings from an instrument."),
     "twin": ("acquire", "Simulate the instrument."),
-    "import": ("importing", "Read a measurement from a spreadsheet."),
+    "import": ("files", "Read a measurement from a spreadsheet."),
     "simulate": ("simulate", "Simulate the run of a scenario."),
     "evaluate": ("evaluate", "Calibrate the machine from a run."),
     "plot": ("plot", "Draw a calibration, a measurement and other files."),
@@ -48,6 +48,7 @@ COMMANDS: Final = {
     "export": ("export", "Write a calibration for a controller."),
     "check": ("files", "Check files, and whether a scenario and a run belong together."),
     "selftest": ("files", "Compare this installation with known truths."),
+    "book": ("book", "Keep machines, their runs, calibrations and reports."),
     "head": ("head", "Draw and check descriptions of laser heads."),
 }
 

@@ -6,9 +6,9 @@ from typing import Final, Literal
 import click
 
 from stepdiag._core import InvalidArgument
+from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.options import (
     PATH,
-    Grouped,
     Writes,
     input_warnings,
     json_option,
@@ -28,7 +28,8 @@ MOST_COVARIED: Final = 2000
 
 
 @click.command(
-    cls=Grouped,
+    cls=OfMachine,
+    makes={"output": Kept("calibrations", ".nc")},
     groups={"Evaluation": ["method", "reliability"], "Output": ["output", "covariance", "as_json"]},
     epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv",
 )
@@ -146,7 +147,11 @@ def _step_counts(context: click.Context, option: click.Parameter, text: str | No
     return counts
 
 
-@click.command(epilog="\b\nExample: stepdiag observe scenario.toml --steps 10,20,50,100")
+@click.command(
+    cls=OfMachine,
+    makes={"output": Kept("plans")},
+    epilog="\b\nExample: stepdiag observe scenario.toml --steps 10,20,50,100",
+)
 @click.argument("scenario", type=PATH)
 @click.option(
     "--steps",

@@ -1,11 +1,24 @@
-"""The command that writes a calibration for a controller."""
+"""Commands that write files for controllers: a calibration, and the measuring program of a plan."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes, json_option, made_of, options_of, tell, tell_trust, trust_warnings
+from stepdiag.cli.in_book import Kept, OfMachine
+from stepdiag.cli.options import (
+    PATH,
+    Writes,
+    json_option,
+    made_of,
+    options_of,
+    out_file,
+    tell,
+    tell_inputs,
+    tell_trust,
+    trust_warnings,
+)
 from stepdiag.cli.terminal import say
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.io.outputs import (
@@ -16,10 +29,12 @@ from stepdiag.io.outputs import (
     ISG_TABLE,
     KINEMATICS_TABLE,
     POSITION_ERROR,
+    PROGRAM,
     SQUARENESS_TABLE,
     OutputFile,
     claim_folder,
 )
+from stepdiag.program.options import Options
 from stepdiag.progress import Progress
 
 # Those of stepdiag.exporting.write.FORMATS, which is slow to import; a test compares them.
@@ -36,13 +51,20 @@ FORMATS = ("linuxcnc-comp", *KINDS)
 FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # linuxcnc-comp
 
 
+def _ending(params: Mapping[str, Any]) -> str:
+    """Of an export in a machine book; "/": a folder."""
+    return KINDS[params["to"]].endings[0] if params["to"] in KINDS else "/"
+
+
 @click.command(
+    cls=OfMachine,
+    makes={"output": Kept("exports", _ending)},
     epilog="\b\nExamples:\n"
     "  stepdiag export calibration.csv --to linuxcnc-kins -o machine.csv\n"
     "  stepdiag export calibration.csv --to linuxcnc-comp --at 400 300 250 -o comp\n"
     "  stepdiag export calibration.csv --to csv-grid --step 25 -o grid.csv\n"
     "  stepdiag export calibration.csv --to matrix -o matrix.hal\n"
-    "  stepdiag export calibration.csv --to position-error --axis Y --depends-on X -o sag.csv"
+    "  stepdiag export calibration.csv --to position-error --axis Y --depends-on X -o sag.csv",
 )
 @click.argument("calibration", type=PATH)
 @click.option("--to", "to", required=True, type=click.Choice(FORMATS), help="Format.")
@@ -101,3 +123,39 @@ def export(
         elif not as_json:
             say(line)
     tell_trust(context, calibration, read)
+
+
+@click.command(
+    cls=OfMachine,
+    makes={"output": Kept("plans", ".ngc")},
+    epilog="\b\nExample: stepdiag nc scenario.toml -o run.ngc --dialect linuxcnc",
+)
+@click.argument("scenario", type=PATH)
+@out_file("Program to write, such as run.ngc (not .nc, which is netCDF here).", PROGRAM)
+@options_of(Options)
+def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
+    """Write the measuring program of SCENARIO: G-code for the machine's controller.
+
+    The axes move through the plan's points in its order, with feed and times of [plan_by_time]. At
+    each point the program waits and requests a reading, which `acquire` records. Between lines the
+    program stops to set up head and mirror.
+
+    Positions are those of the axes, counted from home, without tool length. Every visit of a line
+    begins with an overrun, so that all axes approach all points from the side that the plan
+    specifies. With --overrun 0, or where --limits cut the overrun, the program and a warning name
+    the points that an axis approaches from another side, or by less.
+    """
+    from stepdiag.io.whole_files import write_whole
+    from stepdiag.program.measuring_program import measuring_program
+    from stepdiag.scenario.description import read_scenario
+
+    described = read_scenario(scenario)
+    tell_inputs(described)
+    path = output.claim(scenario, error_map=described.truth.error_map)
+    program = measuring_program(described.known, made_of(Options, given))
+    write_whole(path, program.text)
+    for text in program.unapproached:
+        tell("warning", text)
+    for line in program.summary:
+        say(line)
+    click.echo(f"wrote {path}")

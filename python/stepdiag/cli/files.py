@@ -1,4 +1,4 @@
-"""Commands that create a user's first files, and that check files and the installation."""
+"""Commands that create a user's first files, take in those of spreadsheets, and check files and the installation."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,9 +7,9 @@ from typing import TypeVar
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, out_file, tell
 from stepdiag.cli.terminal import plain, say
-from stepdiag.io.outputs import SELFTEST, OutputFile
+from stepdiag.io.outputs import MEASUREMENT, SELFTEST, OutputFile
 from stepdiag.progress import Progress
 
 Result = TypeVar("Result")
@@ -179,3 +179,64 @@ def selftest(context: click.Context, output: OutputFile | None, as_json: bool) -
         tell("warning", warning)
     if warnings:
         context.exit(NOT_TO_BE_TRUSTED)
+
+
+@click.command("import", epilog="\b\nExample: stepdiag import readings.xlsx -o run.csv")
+@click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
+@out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="HEAD=NAME",
+    help='What a head means: "Distance [µm]=distance", "Tilt A=-alpha [µrad]"; "HEAD=" leaves it out.',
+)
+@click.option("--separator", type=click.Choice(["comma", "semicolon", "tab"]), help="Separator of fields.")
+@click.option("--decimal", type=click.Choice(["point", "comma"]), help="Decimal mark of numbers.")
+@click.option("--sheet", metavar="NAME", help="Sheet of the workbook.  [default: the one with the heads]")
+@click.option("--scenario", type=PATH, metavar="FILE", help="Take the commanded positions from this scenario's plan.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing measurement of this name.")
+def import_(
+    files: tuple[Path, ...],
+    output: OutputFile,
+    columns: tuple[str, ...],
+    separator: str | None,
+    decimal: str | None,
+    sheet: str | None,
+    scenario: Path | None,
+    overwrite: bool,
+) -> None:
+    """Read the measurement in each FILE in the form that spreadsheet programs give it.
+
+    FILE is text with commas, semicolons or tabs (UTF-8, UTF-16 or Latin-1), or a workbook (.xlsx,
+    .ods). Heads may have any case, and units in brackets: "Spot X [µm]". The command prints what
+    it took each column for. Where a file can be read in two ways it says which, and does not
+    choose. Several files become one measurement.
+    """
+    from stepdiag.importing.run import import_files
+    from stepdiag.io.data_files import write_measurement
+    from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.plausible_inputs import odd_columns
+
+    described = read_scenario(scenario) if scenario is not None else None
+    path = output.claim(
+        *files,
+        *([scenario] if scenario is not None else []),
+        error_map=described.truth.error_map if described else None,
+        overwrite=overwrite,
+    )
+    with Progress("import"):
+        found = import_files(
+            files,
+            column=columns,
+            separator=separator,
+            decimal=decimal,
+            sheet=sheet,
+            plan=described.known.plan if described else None,
+        )
+    write_measurement(found.measurement, path)
+    for line in found.text:
+        say(line)
+    for warning in odd_columns(found.measurement, described.known.keys if described else None):
+        tell("warning", f"{path}: {warning}")
+    click.echo(f"wrote {path}")

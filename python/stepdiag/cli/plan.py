@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
+from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.options import PATH, Writes, tell_inputs, tell_trust
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
@@ -35,7 +36,11 @@ class _Positive(click.FloatRange):
 _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
 
 
-@click.command(epilog="\b\nExample: stepdiag plan scenario.toml --minutes 30 -o plan.png")
+@click.command(
+    cls=OfMachine,
+    makes={"output": Kept("plans")},
+    epilog="\b\nExample: stepdiag plan scenario.toml --minutes 30 -o plan.png",
+)
 @click.argument("scenario", type=PATH)
 @click.option(
     "--minutes",

@@ -5,6 +5,7 @@ from typing import Final
 
 import click
 
+from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.interrupts import unwinding
 from stepdiag.cli.options import PATH, Writes, out_file, tell
 from stepdiag.cli.terminal import say
@@ -14,7 +15,11 @@ from stepdiag.progress import Progress
 LINUXCNC_PATIENCE: Final = 40.0  # s; what a killed LinuxCNC leaves disturbs the next one
 
 
-@click.command(epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
+@click.command(
+    cls=OfMachine,
+    makes={"output": Kept("runs", ".csv")},
+    epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv",
+)
 @click.argument("scenario", type=PATH)
 @out_file("Measurement file to write, CSV or netCDF (.nc).", MEASUREMENT)
 @click.option("--overwrite", is_flag=True, help="Replace an existing measurement of this name.")

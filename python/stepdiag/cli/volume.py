@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import click
 
+from stepdiag.cli.in_book import OfMachine
 from stepdiag.cli.options import PATH, PointInMm, json_option, tell_trust, trust_warnings
 from stepdiag.cli.terminal import say
 from stepdiag.progress import Progress
@@ -37,7 +38,7 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLES)
+@click.command(cls=OfMachine, about=True, epilog=EXAMPLES)
 @click.argument("calibration", type=PATH)
 @click.option("--limit", type=float, metavar="UM", help="Limit of the largest error, µm: adds a verdict.")
 @click.option("--tool", type=PointInMm(), help="Tool offset, mm.  [default: the calibration's]")

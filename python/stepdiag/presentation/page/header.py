@@ -19,6 +19,7 @@ TITLES: Final[Mapping[str, str]] = {
     "certificate": "Certificate",
     "conditions": "Conditions",
 }
+_FLAGS: Final = {"machine": "machine_type"}  # --machine is that of the machine book
 LARGEST_LOGO: Final = 512 * 1024  # bytes; the page is to stay small
 
 
@@ -37,9 +38,10 @@ def header_of(
     Raises InvalidArgument for texts that are empty or too long, and for a logo that is no picture."""
     words = {}
     for key in TITLES:
-        text = given.get(key)
+        flag = _FLAGS.get(key, key)
+        text = given.get(flag)
         if text is not None and not 1 <= len(text) <= LONGEST:
-            raise InvalidArgument(f"`{key}`: expected a text of 1 to {LONGEST} characters, got {len(text)}")
+            raise InvalidArgument(f"`{flag}`: expected a text of 1 to {LONGEST} characters, got {len(text)}")
         own = None if section is None else getattr(section, key)
         if text or own:
             words[key] = str(text or own)

@@ -1,0 +1,210 @@
+"""The commands `stepdiag book ...`: the register of machines and their files."""
+
+import re
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from stepdiag._core import InvalidArgument
+from stepdiag.cli.in_book import BOOK
+from stepdiag.cli.options import PATH, Command, InOrder, tell
+from stepdiag.cli.terminal import say
+from stepdiag.progress import Progress
+
+EPILOG = """\b
+Begin a book with a machine, and calibrate it from a run:
+  stepdiag book new VMC-1200 --book calibrations --serial-number 0815 --limit 20
+  cd calibrations
+  stepdiag book add --machine VMC-1200 scenario.toml run.csv
+  stepdiag evaluate --machine VMC-1200
+  stepdiag book show VMC-1200
+"""
+_DAY: Final = re.compile(r"\d{4}-\d\d-\d\d")
+_ABOUT: Final = {
+    "title": "Maker and type of the machine.",
+    "serial_number": "Serial number.",
+    "customer": "Whose machine it is.",
+    "place": "Where it stands.",
+    "notes": "What else to know.",
+}
+_MACHINE: Final = click.option("--machine", metavar="NAME", required=True, help="Machine of the book.")
+
+
+@click.group(cls=InOrder, epilog=EPILOG)
+def book() -> None:
+    """Keep machines, their runs, calibrations and reports in a folder: the machine book.
+
+    A book is a folder of plain files, machines/NAME/runs, calibrations and so on. It can be copied,
+    mailed and opened without stepdiag. Nothing in it is replaced or deleted. Other commands work on
+    a machine of the book with --machine NAME.
+    """
+
+
+def _about_options(command: Command) -> Command:
+    for name, meaning in reversed(_ABOUT.items()):
+        command = click.option(f"--{name.replace('_', '-')}", metavar="TEXT", help=meaning)(command)
+    return command
+
+
+@book.command(short_help="Add a machine.", epilog="\b\nExample: stepdiag book new VMC-1200 --serial-number 0815")
+@click.argument("name")
+@_about_options
+@click.option("--limit", type=float, metavar="UM", help="Limit of the largest error in the volume, µm.")
+@click.option("--interval", type=float, metavar="DAYS", help="Longest time between two calibrations, days.")
+@BOOK
+def new(name: str, limit: float | None, interval: float | None, book: Path | None, **about: str | None) -> None:
+    """Add the machine NAME to the book; --book names a new or empty folder to begin a book.
+
+    What is known of the machine is written to machines/NAME/machine.toml, which you can edit.
+    """
+    from stepdiag.book.book import Book, find_book
+    from stepdiag.book.machine_keys import AboutMachine
+    from stepdiag.config.toml_text import check_keys
+
+    words = {key: text for key, text in about.items() if text is not None}
+    numbers = {key: number for key, number in (("limit_um", limit), ("interval_days", interval)) if number is not None}
+    checked = check_keys({**words, **numbers}, AboutMachine, f"machine {name}")
+    machine = (find_book(None) if book is None else Book.make(book)).new_machine(name, checked)
+    click.echo(f"wrote {machine.folder / 'machine.toml'}")
+
+
+@book.command("list", short_help="List the machines.", epilog="\b\nExample: stepdiag book list")
+@BOOK
+def list_machines(book: Path | None) -> None:
+    """List the machines: last calibration, verdict of its fit, largest error against the limit, when due."""
+    from stepdiag.book.blocks import machines_blocks
+    from stepdiag.book.book import find_book
+    from stepdiag.book.overview import overview
+    from stepdiag.presentation.blocks import text_of
+
+    found = find_book(book)
+    rows = []
+    for machine in found.machines():
+        with Progress(f"files of {machine.name}") as progress:
+            rows.append(overview(machine, progress=progress))
+    for line in text_of(machines_blocks(rows)):
+        say(line)
+    _tell_index(found)
+
+
+@book.command(short_help="Show a machine and its files.", epilog="\b\nExample: stepdiag book show VMC-1200")
+@click.argument("machine")
+@click.option("--removed", is_flag=True, help="Also list the files in the bin.")
+@BOOK
+def show(machine: str, removed: bool, book: Path | None) -> None:
+    """Show what is known of MACHINE, its calibrations in the order of time, and its files."""
+    from stepdiag.book.blocks import machine_blocks
+    from stepdiag.book.book import find_book
+    from stepdiag.book.overview import overview
+    from stepdiag.presentation.blocks import text_of
+
+    found = find_book(book).machine(machine)
+    with Progress(f"files of {found.name}") as progress:
+        row = overview(found, progress=progress)
+    entries = found.entries(removed=removed)
+    for line in text_of(machine_blocks(row, entries)):
+        say(line)
+    _tell_index(found.book)
+
+
+@book.command(
+    short_help="Take in files.", epilog="\b\nExample: stepdiag book add --machine VMC-1200 scenario.toml run.csv"
+)
+@click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
+@_MACHINE
+@click.option("--measured", metavar="DATE", help="Day of the measurement, such as 2026-03-31.")
+@BOOK
+@click.pass_context
+def add(context: click.Context, files: tuple[Path, ...], machine: str, measured: str | None, book: Path | None) -> None:
+    """Copy each FILE into the book: scenarios, runs, calibrations, exports, reports, any document.
+
+    A scenario comes with the files that it names. A damaged file is refused. A file that the book
+    already has is not taken in again.
+    """
+    from stepdiag.book.book import find_book
+
+    if measured is not None and not _DAY.fullmatch(measured):
+        raise InvalidArgument(f"--measured: expected a day such as 2026-03-31, got {measured!r}")
+    found = find_book(book).machine(machine)
+    command = ("stepdiag", "book", "add", "--machine", found.name)
+    refused = 0
+    for file in files:
+        try:
+            with Progress(f"add {file.name}"):
+                entry, is_new = found.add(file, command=(*command, str(file)), measured=measured or "")
+        except InvalidArgument as error:  # the others are taken in
+            tell("error", str(error))
+            refused += 1
+            continue
+        say(f"{file}: {'kept as' if is_new else 'already in the book as'} {entry.file}")
+        for warning in entry.facts.warnings:
+            tell("warning", f"{file}: {warning}")
+    if refused:
+        context.exit(2)
+
+
+@book.command(short_help="Search machines and files.", epilog="\b\nExample: stepdiag book find 0815")
+@click.argument("words", nargs=-1, required=True, metavar="WORD...")
+@BOOK
+def find(words: tuple[str, ...], book: Path | None) -> None:
+    """List the machines and files in which every WORD occurs: names, serial numbers, dates, verdicts."""
+    from stepdiag.book.book import Entry, find_book
+
+    found = list(find_book(book).find(words))
+    for one in found:
+        if isinstance(one, Entry):
+            say(f"{one.machine}: {one.file}: {one.facts.kind or 'file'} of {one.date[:10]}")
+        else:
+            about = [text for text in (one.about.title, one.about.serial_number, one.about.customer) if text]
+            say(f"{one.name}: machine{': ' if about else ''}{', '.join(about)}")
+    if not found:
+        tell("note", f"nothing in the book has {' and '.join(words)}")
+
+
+@book.command(short_help="Move a file into the bin.", epilog="\b\nExample: stepdiag book remove --machine M run.csv")
+@click.argument("name")
+@_MACHINE
+@BOOK
+def remove(name: str, machine: str, book: Path | None) -> None:
+    """Move the file NAME of a machine into the bin. `stepdiag book restore` moves it back."""
+    from stepdiag.book.book import find_book
+
+    found = find_book(book).machine(machine)
+    entry = found.entry(name)
+    _say_moved(found.remove(entry, command=("stepdiag", "book", "remove", "--machine", found.name, name)))
+
+
+@book.command(short_help="Move a file back.", epilog="\b\nExample: stepdiag book restore --machine M run.csv")
+@click.argument("name")
+@_MACHINE
+@BOOK
+def restore(name: str, machine: str, book: Path | None) -> None:
+    """Move the file NAME of a machine back from the bin."""
+    from stepdiag.book.book import find_book
+
+    found = find_book(book).machine(machine)
+    entry = found.entry(name, removed=True)
+    _say_moved(found.restore(entry, command=("stepdiag", "book", "restore", "--machine", found.name, name)))
+
+
+@book.command(short_help="Make the index again.", epilog="\b\nExample: stepdiag book reindex")
+@BOOK
+def reindex(book: Path | None) -> None:
+    """Make book.sqlite again from the files."""
+    from stepdiag.book.book import find_book
+
+    found = find_book(book)
+    with Progress("machines") as progress:
+        count = found.reindex(progress)
+    say(f"{count} files of {len(found.machines())} machines")
+    _tell_index(found)
+
+
+def _say_moved(path: Path) -> None:
+    say(f"moved to {path}")
+
+
+def _tell_index(found: Any) -> None:
+    if found.index.only_in_memory:
+        tell("note", found.index.only_in_memory)
