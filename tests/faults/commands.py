@@ -34,6 +34,8 @@ samples = 0
 plan.steps = [2, 3]
 """
 
+ADDED = ("scenario.toml", "run.csv", "calibration.nc")  # of the inputs, those in the book
+
 COMMANDS = (
     Command("simulate scenario.toml --overwrite -o out.csv", ("out.csv",)),
     Command("simulate scenario.toml --overwrite -o out.nc", ("out.nc",)),
@@ -107,7 +109,7 @@ def make_inputs(folder: Path, scenario: str, main: Callable[[list[str]], int]) -
     with_map = scenario.replace("[machine.random]\nseed = 7", 'errors = "map.csv"')
     (folder / "mapped.toml").write_text(with_map.replace("[machine.random]\nseed = 8", 'errors = "map.csv"'))
     assert main(["book", "new", "M", "--book", "book"]) == 0
-    assert main("book add --book book --machine M scenario.toml run.csv calibration.nc".split()) == 0
+    assert main(["book", "add", "--book", "book", "--machine", "M", *ADDED]) == 0
     rows = [line.split(",") for line in Path("run.csv").read_text().splitlines() if not line.startswith("#")]
     Path("sheet.csv").write_text("\n".join(";".join(row).replace(".", ",") for row in rows))
     book = openpyxl.Workbook()

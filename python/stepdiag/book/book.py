@@ -6,10 +6,8 @@ change leaves a record. Several programs may use a book at once, because a name 
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -17,7 +15,7 @@ from typing import Final
 from stepdiag._core import InvalidArgument
 from stepdiag.book import records
 from stepdiag.book.facts import Facts, facts_of
-from stepdiag.book.index import Index, Progress
+from stepdiag.book.index import Index, Indexed, Progress
 from stepdiag.book.layout import (
     ABOUT,
     BIN,
@@ -40,26 +38,39 @@ from stepdiag.io.whole_files import check_input, make_folder, read_bytes, read_t
 VARIABLE: Final = "STEPDIAG_BOOK"
 
 
-@dataclass(frozen=True)
 class Entry:
-    """A file of a machine, or a folder that is one."""
+    """A file of a machine, or a folder that is one.
 
-    machine: str
-    file: str  # in the machine's folder: calibrations/2026-11-27.nc
-    path: Path
-    sha256: str
-    facts: Facts
-    date: str  # ISO 8601: of the measurement if it is known, else of the file
-    record: Record | None  # of the command that made it
+    file: its name in the machine's folder, such as calibrations/2026-11-27.nc. kind: as in file_kind.py; None for a
+    file that is damaged or not recognised. date: ISO 8601, of the measurement if it is known, else of the file."""
+
+    def __init__(self, machine: "MachineFolder", indexed: Indexed) -> None:
+        self.machine, self.path = machine.name, machine.folder / indexed.file
+        self.file, self.sha256, self.kind, self.date, self._record, self._facts = indexed
+        self._index = machine.book.index
+
+    @cached_property
+    def facts(self) -> Facts:
+        return Facts.model_validate_json(self._facts)
+
+    @cached_property
+    def record(self) -> Record | None:
+        """Of the command that made it."""
+        return None if self._record is None else self._index.record(self.machine, self._record)
 
     @property
     def name(self) -> str:
         return self.path.name
 
     @property
+    def words(self) -> str:
+        """What a search looks at."""
+        return " ".join((self.file, self.date, self._facts)).casefold()
+
+    @property
     def folder(self) -> str:
         """Where it is, or was before it was removed."""
-        return Path(self.file).parts[-2]
+        return self.file.split("/")[-2]
 
     @property
     def removed(self) -> bool:
@@ -131,7 +142,7 @@ class Book:
             if all(word in said for word in wanted):
                 yield machine
             for entry in machine.entries(removed=True):
-                own = " ".join((entry.file, entry.date, entry.facts.model_dump_json())).casefold()
+                own = entry.words
                 if any(word in own for word in wanted) and all(word in own or word in said for word in wanted):
                     yield entry
 
@@ -165,30 +176,16 @@ class MachineFolder:
         self, folder: str | None = None, *, removed: bool = False, progress: Progress | None = None
     ) -> list[Entry]:
         """Its files, the oldest first; those in the bin only if `removed`."""
-        index = self.book.index
-        index.refresh(self.folder, progress)
-        made: dict[str, Record] = {}
-        for record in index.records(self.name).values():
-            made.update(dict.fromkeys((output.file for output in record.outputs), record))
-        found = []
-        for one in index.entries(self.name):
-            by = made.get(one.file)
-            date = _measured(by, made) or one.facts.date or (by.ended or by.begun if by else "")
-            date = date or f"{datetime.fromtimestamp(one.mtime * 1e-9, UTC):%Y-%m-%dT%H:%M:%SZ}"
-            found.append(Entry(self.name, one.file, self.folder / one.file, one.sha256, one.facts, date, by))
-        return sorted(
-            (one for one in found if (removed or not one.removed) and folder in (None, one.folder)),
-            key=lambda one: (one.date, one.file),
-        )
+        self.book.index.refresh(self.folder, progress)
+        found = [Entry(self, one) for one in self.book.index.entries(self.name)]
+        return [one for one in found if (removed or not one.removed) and folder in (None, one.folder)]
 
     def last(self, kind: str, *, apart_from: Sequence[str] = ()) -> Entry | None:
         """The latest sound file of a kind."""
         of_kind = [
             one
             for one in self.entries()
-            if (one.facts.kind, one.folder) == (kind, folder_of(kind))
-            and not one.facts.damaged
-            and one.file not in apart_from
+            if (one.kind, one.folder) == (kind, folder_of(kind)) and one.file not in apart_from
         ]
         return of_kind[-1] if of_kind else None
 
@@ -331,18 +328,6 @@ def find_book(given: Path | None) -> Book:
         f"no machine book here: name its folder with `book`, or in the environment variable {VARIABLE}; "
         "`stepdiag book new NAME` makes one"
     )
-
-
-def _measured(record: Record | None, made: Mapping[str, Record]) -> str:
-    """The day of the measurement that a person has stated of this file, or of one from which it was made."""
-    seen: list[Record] = []
-    while record is not None and record not in seen:
-        if record.measured:
-            return record.measured
-        seen.append(record)
-        runs = [given.file for given in record.inputs if given.file.startswith("runs/")]
-        record = made.get(runs[0]) if len(runs) == 1 else None
-    return ""
 
 
 def _names_of(entry: Entry) -> tuple[str, ...]:

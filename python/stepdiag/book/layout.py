@@ -67,6 +67,7 @@ stepdiag. book.sqlite is an index that is made again from the files if it is mis
 """
 
 _SAFE: Final = re.compile(r"[^\W_][\w .+()-]*")
+_TEMPORARY: Final = re.compile(r".+\.([0-9a-f]{16}|[0-9]+-[0-9]+)")
 _OF_WINDOWS: Final = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 
 
@@ -168,14 +169,9 @@ def _is_whole(folder: Path) -> bool:
         return False
 
 
-def entries_in(folder: Path) -> Iterator[Path]:
-    """The files and folders that count: no hidden ones, none that are empty (begun), no temporary ones."""
-    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if path.name.startswith(".") or re.fullmatch(r".+\.([0-9a-f]{16}|[0-9]+-[0-9]+)", path.name):
-            continue
-        main = main_file(path)
-        if main.is_file() and main.stat().st_size:
-            yield path
+def counts(name: str) -> bool:
+    """Whether a file of this name belongs to the book: not hidden ones, nor those that are just written."""
+    return not name.startswith(".") and not _TEMPORARY.fullmatch(name)
 
 
 def _variants(name: str) -> Iterator[str]:

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass
 from datetime import date, timedelta
+from typing import Final
 
 from stepdiag.book.book import Entry, MachineFolder
 from stepdiag.book.index import Progress
 from stepdiag.book.machine_keys import AboutMachine
 from stepdiag.calibration.volume import Verdict
+
+KIND: Final = "calibration"
 
 
 @dataclass(frozen=True)
@@ -20,14 +23,16 @@ class Overview:
     due: date | None
 
 
+def is_usable(calibration: Entry) -> bool:
+    """Whether its fit is not rejected."""
+    facts = calibration.facts.calibration
+    return facts is not None and facts.fit != "rejected"
+
+
 def overview(machine: MachineFolder, progress: Progress | None = None) -> Overview:
     about = machine.about
-    sound = [
-        one
-        for one in machine.entries("calibrations", progress=progress)
-        if one.facts.calibration is not None and one.facts.calibration.fit != "rejected"
-    ]
-    last = sound[-1] if sound else None
+    calibrations = reversed([one for one in machine.entries("calibrations", progress=progress) if one.kind == KIND])
+    last = next((one for one in calibrations if is_usable(one)), None)
     facts = last.facts.calibration if last else None
     verdict = facts.verdict(about.limit_um) if facts else None
     return Overview(machine.name, about, last, verdict, _due(last, about))

@@ -154,7 +154,7 @@ def find(words: tuple[str, ...], book: Path | None) -> None:
     found = list(find_book(book).find(words))
     for one in found:
         if isinstance(one, Entry):
-            say(f"{one.machine}: {one.file}: {one.facts.kind or 'file'} of {one.date[:10]}")
+            say(f"{one.machine}: {one.file}: {one.kind or 'file'} of {one.date[:10]}")
         else:
             about = [text for text in (one.about.title, one.about.serial_number, one.about.customer) if text]
             say(f"{one.name}: machine{': ' if about else ''}{', '.join(about)}")

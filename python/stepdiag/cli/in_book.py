@@ -159,7 +159,7 @@ class _Use:
                 (
                     one
                     for one, count in wanted
-                    if entry.facts.kind in (KINDS[one], "error map" if one in "ab" else None)
+                    if entry.kind in (KINDS[one], "error map" if one in "ab" else None)
                     and (count == -1 or not given[one])
                 ),
                 None,
@@ -185,10 +185,10 @@ class _Use:
         others = [entry for entries in given.values() for entry in entries]
         origins = [origin for one in others for origin in self.machine.origins(one)]
         if kind == "scenario":
-            runs = [one for one in (*others, *origins) if one.facts.kind == "measurement"]
+            runs = [one for one in (*others, *origins) if one.kind == "measurement"]
             of_run = [origin for run in runs for origin in self.machine.origins(run)]
             for one in of_run:
-                if one.facts.kind == kind and not one.removed:
+                if one.kind == kind and not one.removed:
                     return one
         apart = [one.file for one in others] + [one.file for one in origins if self.command.other_run]
         found = self.machine.last(kind, apart_from=apart)
@@ -208,7 +208,7 @@ class _Use:
                 params[name] = self._used(self.machine.entry(str(params[name])))
             elif params[name] is None and name in KINDS and params.get("output") is not None:
                 origins = [o for entries in given.values() for one in entries for o in self.machine.origins(one)]
-                entry = next((one for one in origins if one.facts.kind == KINDS[name]), None)
+                entry = next((one for one in origins if one.kind == KINDS[name]), None)
                 params[name] = None if entry is None else self._used(entry)
 
     def _used(self, entry: "Entry") -> Path:
@@ -249,5 +249,5 @@ class _Use:
 
 
 def _a(entry: "Entry") -> str:
-    kind = entry.facts.kind or "file that stepdiag does not read"
+    kind = entry.kind or "file that stepdiag does not read"
     return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
