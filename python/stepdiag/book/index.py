@@ -90,6 +90,25 @@ class Index:
             return records.parse(content[0], Path(file))
         return None
 
+    def _refresh(self, machine: Path, progress: Progress | None) -> None:
+        name = machine.name
+        changed = self._refresh_records(machine)
+        found = dict(_scanned(machine))
+        known = {
+            file: (size, mtime)
+            for file, size, mtime in self._rows(
+                "SELECT file, size, mtime FROM entries WHERE machine = ? AND instr(facts, ?)", name, f'"made":{FACTS},'
+            )
+        }
+        gone = [(name, file) for file in known if file not in found]
+        new = [file for file, state in found.items() if known.get(file) != state]
+        if gone:
+            self._write("DELETE FROM entries WHERE machine = ? AND file = ?", gone)
+        if new:
+            self._read(machine, new, found, progress)
+        if new or gone or changed:
+            self._date(machine)
+
     def _read(self, machine: Path, new: list[str], found: dict[str, State], progress: Progress | None) -> None:
         """New files: what a record knows of one need not be read."""
         recorded = {
