@@ -1,5 +1,6 @@
 """Progress of long computations, in a terminal and in a notebook (tqdm)."""
 
+import os
 import sys
 import time
 from threading import Event, Thread
@@ -7,6 +8,7 @@ from typing import Any, Final, Self
 
 DELAY: Final = 1.0  # s; what ends sooner shows nothing
 _TICK: Final = 0.5  # s
+VARIABLE: Final = "STEPDIAG_PROGRESS"  # of the environment: "lines" for programs that show progress themselves
 
 
 class Progress:
@@ -16,20 +18,22 @@ class Progress:
             result = sd.montecarlo.evaluate_uncertainty(scenario, request, progress)
 
     Shows a bar in a notebook, or on standard error if that is a terminal, from the first second on. What does not call
-    it shows the time that has passed. The bar disappears at the end. Elsewhere nothing is shown."""
+    it shows the time that has passed. The bar disappears at the end. Elsewhere nothing is shown. If STEPDIAG_PROGRESS
+    in the environment is "lines", lines such as "stepdiag: progress: plans 3/10" go to standard error."""
 
     def __init__(self, label: str) -> None:
         self._label = label
         self._done: tuple[int, int] | None = None
         self._bar: Any = None
         self._in_notebook = "ipykernel" in sys.modules
+        self._in_lines = os.environ.get(VARIABLE) == "lines"
         self._start = 0.0
         self._ended = Event()
         self._ticking: Thread | None = None
 
     def __enter__(self) -> Self:
         self._start = time.monotonic()
-        if sys.stderr.isatty() and not self._in_notebook:  # where widgets belong to the main thread
+        if (sys.stderr.isatty() or self._in_lines) and not self._in_notebook:  # where widgets belong to the main thread
             self._ticking = Thread(target=self._tick, daemon=True)
             self._ticking.start()
         return self
@@ -54,6 +58,10 @@ class Progress:
     def _draw(self) -> None:
         passed = time.monotonic() - self._start
         if passed < DELAY:
+            return
+        if self._in_lines:
+            share = "" if self._done is None else f" {self._done[0]}/{self._done[1]}"
+            print(f"stepdiag: progress: {self._label}{share}", file=sys.stderr, flush=True)
             return
         if self._bar is None:
             from tqdm.auto import tqdm  # type: ignore[import-untyped]  # slow; most computations end before

@@ -44,8 +44,9 @@ BELOW: dict[str, set[str]] = {
     "selftest": {"uncertainty"},
     "presentation": {"figures", "acquisition", "positions", "evaluation", "exporting", "selftest"},
     "book": {"presentation"},
+    "app": {"book"},
     "demo": {"presentation", "program", "linuxcnc", "twin"},
-    "cli": {"demo", "progress", "importing", "book"},
+    "cli": {"demo", "progress", "importing", "app"},
     # What the package shows to specialists.
     "optics": {"head"},
     "methods": {"planning"},

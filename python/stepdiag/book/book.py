@@ -177,6 +177,10 @@ class MachineFolder:
     ) -> list[Entry]:
         """Its files, the oldest first; those in the bin only if `removed`."""
         self.book.index.refresh(self.folder, progress)
+        return self.listed(folder, removed=removed)
+
+    def listed(self, folder: str | None = None, *, removed: bool = False) -> list[Entry]:
+        """The same as at the last call of `entries`."""
         found = [Entry(self, one) for one in self.book.index.entries(self.name)]
         return [one for one in found if (removed or not one.removed) and folder in (None, one.folder)]
 

@@ -81,7 +81,9 @@ class Index:
         try:
             return [Indexed(*row) for row in rows]
         except sqlite3.Error as error:
-            raise InvalidArgument(f"{self._path}: cannot be read: {error}") from None
+            raise InvalidArgument(
+                f"{self._path}: cannot be read: {error}; `stepdiag book reindex` makes it again"
+            ) from None
 
     def record(self, machine: str, file: str) -> Record | None:
         """None if this program cannot read it."""
@@ -153,7 +155,8 @@ class Index:
 
     # --- the database -----------------------------------------------------------------------------------------------
     def _opened(self, path: str) -> sqlite3.Connection:
-        database = sqlite3.connect(path, timeout=PATIENCE)
+        # One request of a server may be served by several threads, one after the other.
+        database = sqlite3.connect(path, timeout=PATIENCE, check_same_thread=False)
         try:
             if database.execute("PRAGMA user_version").fetchone()[0] != VERSION:
                 with database:

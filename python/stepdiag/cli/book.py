@@ -1,6 +1,7 @@
-"""The commands `stepdiag book ...`: the register of machines and their files."""
+"""The commands `stepdiag book ...`, the register of machines and their files, and `stepdiag app`, its pages."""
 
 import re
+import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -208,3 +209,37 @@ def _say_moved(path: Path) -> None:
 def _tell_index(found: Any) -> None:
     if found.index.only_in_memory:
         tell("note", found.index.only_in_memory)
+
+
+@click.command(epilog="\b\nExample: stepdiag app calibrations")
+@click.argument("book", type=PATH, required=False)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port on this computer, 127.0.0.1.  [default: a free one]",
+)
+@click.option("--browser/--no-browser", default=True, show_default=True, help="Open the page in the browser.")
+def app(book: Path | None, port: int, browser: bool) -> None:
+    """Open the machine book BOOK as pages in your browser; a new or empty folder begins a book.
+
+    The pages come from this computer alone, and no other computer can open them. The address that is
+    printed lets a browser in. Ctrl-C ends the application; what its commands have written stays.
+    """
+    import webbrowser
+
+    from stepdiag.app.dependencies import check_installed
+    from stepdiag.book.book import Book, find_book
+
+    check_installed()
+    from stepdiag.app.server import serve
+
+    folder = find_book(None).folder if book is None else Book.make(book).folder
+
+    def opened(address: str) -> None:
+        click.echo(f"{folder}: {address} (Ctrl-C ends)")
+        sys.stdout.flush()
+        if browser:
+            webbrowser.open(address)
+
+    serve(folder, port, opened)

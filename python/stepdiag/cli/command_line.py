@@ -48,6 +48,7 @@ COMMANDS: Final = {
     "export": ("export", "Write a calibration for a controller."),
     "check": ("files", "Check files, and whether a scenario and a run belong together."),
     "selftest": ("files", "Compare this installation with known truths."),
+    "app": ("book", "Open the machine book in the browser."),
     "book": ("book", "Keep machines, their runs, calibrations and reports."),
     "head": ("head", "Draw and check descriptions of laser heads."),
 }

@@ -1,0 +1,109 @@
+"""Commands that a page has started: each a process of its own, so that no page waits for it and it can be stopped."""
+
+import asyncio
+import os
+import re
+import secrets
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+_PROGRESS: Final = re.compile(r"stepdiag: progress: (.*?)(?: (\d+)/(\d+))?$")
+_KEPT: Final = re.compile(r"(?:stepdiag: note: |.*: )(?:kept as|already in the book as) (\S.*)$")
+MOST_LINES: Final = 500
+MOST_JOBS: Final = 100  # that are remembered
+
+
+class Job:
+    """Commands one after the other, until one fails. `then`: the address to go to, where {file} is the last result."""
+
+    def __init__(self, title: str, commands: Sequence[Sequence[str]], folder: Path, then: str) -> None:
+        self.id = secrets.token_urlsafe(9)
+        self.title, self.commands, self._folder, self._then = title, commands, folder, then
+        self.status: int | None = None  # exit code, once all is done
+        self.said: list[str] = []
+        self.doing = ""
+        self.share: float | None = None  # of what it is doing, 0 to 1
+        self.kept: list[str] = []  # files of the machine that it made
+        self._process: asyncio.subprocess.Process | None = None
+        self._stopped = False
+        self._task = asyncio.get_running_loop().create_task(self._run())
+
+    @property
+    def next(self) -> str:
+        """The address of the result; empty while there is none."""
+        if self.status not in (0, 3) or ("{file}" in self._then and not self.kept):
+            return ""
+        return self._then.replace("{file}", quote(self.kept[-1]) if self.kept else "")
+
+    async def stop(self) -> None:
+        """As Ctrl-C does."""
+        self._stopped = True
+        if self._process is not None and self._process.returncode is None:
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGINT)
+        await self._task
+
+    async def _run(self) -> None:
+        status = 0
+        for words in self.commands:
+            status = max(status, await self._one(words)) if not self._stopped else 130
+            if status not in (0, 3):
+                break
+        self.status = status
+
+    async def _one(self, words: Sequence[str]) -> int:
+        self._process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "stepdiag",
+            *words,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            cwd=self._folder,
+            env={**os.environ, "STEPDIAG_PROGRESS": "lines", "NO_COLOR": "1"},
+            start_new_session=True,  # Ctrl-C at the server is not one at its commands
+            limit=2**20,
+        )
+        streams = (self._process.stdout, self._process.stderr)
+        await asyncio.gather(*(self._read(stream) for stream in streams if stream is not None))
+        return await self._process.wait()
+
+    async def _read(self, stream: asyncio.StreamReader) -> None:
+        while line := await stream.readline():
+            text = line.decode(errors="replace").rstrip()
+            progress = _PROGRESS.fullmatch(text)
+            if progress is not None:
+                self.doing = progress[1]
+                self.share = int(progress[2]) / max(int(progress[3]), 1) if progress[2] else None
+                continue
+            kept = _KEPT.fullmatch(text)
+            if kept is not None:
+                self.kept.append(kept[1])
+            if len(self.said) < MOST_LINES:
+                self.said.append(text)
+
+
+class Jobs:
+    """All jobs of a server, the last ones remembered."""
+
+    def __init__(self) -> None:
+        self._jobs: dict[str, Job] = {}
+
+    def begin(self, title: str, commands: Sequence[Sequence[str]], folder: Path, then: str) -> Job:
+        job = Job(title, commands, folder, then)
+        self._jobs[job.id] = job
+        for old in [one for one in self._jobs.values() if one.status is not None][:-MOST_JOBS]:
+            del self._jobs[old.id]
+        return job
+
+    def get(self, identifier: str) -> Job | None:
+        return self._jobs.get(identifier)
+
+    async def stop_all(self) -> None:
+        await asyncio.gather(*(job.stop() for job in self._jobs.values() if job.status is None))

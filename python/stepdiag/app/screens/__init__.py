@@ -1,0 +1,1 @@
+"""One module a screen: a function from a book and a request to a page."""
