@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 _PROGRESS: Final = re.compile(r"stepdiag: progress: (.*?)(?: (\d+)/(\d+))?$")
 _KEPT: Final = re.compile(r"(?:stepdiag: note: |.*: )(?:kept as|already in the book as) (\S.*)$")
+COMMAND: Final = ("-m", "stepdiag")
 MOST_LINES: Final = 500
 MOST_JOBS: Final = 100  # that are remembered
 
@@ -59,8 +60,7 @@ class Job:
     async def _one(self, words: Sequence[str]) -> int:
         self._process = await asyncio.create_subprocess_exec(
             sys.executable,
-            "-m",
-            "stepdiag",
+            *COMMAND,
             *words,
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,

@@ -39,6 +39,7 @@ class CalibrationFacts(Section):
     chain: str
     volume: tuple[float, float, float]  # mm
     fit: str | None = None
+    reasons: tuple[str, ...] = ()  # of the fit's verdict
     unverified: bool = False
     undetermined: tuple[str, ...] = ()
     largest: LargestError | None = None  # none: a parameter that acts in it is not determined
@@ -114,6 +115,7 @@ def _of_calibration(calibration: Calibration) -> Facts:
         chain=calibration.chain.name,
         volume=(x, y, z),
         fit=calibration.fit,
+        reasons=tuple(calibration.fit_reasons),
         unverified=calibration.unverified,
         undetermined=tuple(calibration.undetermined),
         largest=_largest(calibration),

@@ -58,7 +58,8 @@ def _fit(facts: CalibrationFacts) -> Markup:
     word = "rejected" if facts.unverified else facts.fit or "not judged"
     headline = _HEADLINES.get(word, "Not judged")
     why = element("p", "The file has no checksum, or was changed: it is unverified.") if facts.unverified else None
-    return banner(word, headline, why)
+    reasons = element("ul", *(element("li", reason) for reason in facts.reasons)) if facts.reasons else None
+    return banner(word, headline, why, reasons)
 
 
 def _limit(facts: CalibrationFacts, limit: float | None) -> Markup:

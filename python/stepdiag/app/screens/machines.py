@@ -9,7 +9,7 @@ from starlette.responses import HTMLResponse
 from stepdiag.app.frame import address, curve, data_table, day, file_address, largest_error, page, verdict
 from stepdiag.book.book import Book, Entry, MachineFolder
 from stepdiag.book.overview import Overview, overview
-from stepdiag.presentation.page.html import Markup, element
+from stepdiag.presentation.page.html import Markup, element, markup
 
 _OF_CURVE: Final = 8  # calibrations
 
@@ -73,9 +73,8 @@ def _card(machine: MachineFolder, row: Overview) -> Markup:
         said.append(element("p", "Not calibrated yet."))
     else:
         x, y, z = facts.volume
-        limit = "" if row.about.limit_um is None else f" of {row.about.limit_um:g} µm"
         said += [
-            element("p", verdict(row.verdict, "machine ") if row.about.limit_um else verdict(facts.fit, "fit "), limit),
+            element("p", _verdict(row)),
             element("p", "Largest error ", largest_error(facts), " on ", day(row.last.date)),
             element("p", f"{x:g} × {y:g} × {z:g} mm", class_="quiet"),
         ]
@@ -91,6 +90,14 @@ def _card(machine: MachineFolder, row: Overview) -> Markup:
         *said,
         curve(_last_errors(machine), row.about.limit_um),
     )
+
+
+def _verdict(row: Overview) -> Markup:
+    """Of the machine beside its limit, or else of the last fit."""
+    limit, facts = row.about.limit_um, row.last.facts.calibration if row.last else None
+    if limit is None:
+        return verdict(facts.fit if facts else None, "Fit ")
+    return markup(verdict(row.verdict), " of its limit of " if row.verdict is None else " ", f"{limit:g} µm")
 
 
 def _last_errors(machine: MachineFolder) -> Sequence[tuple[float, tuple[float, float] | None]]:

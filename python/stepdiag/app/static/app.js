@@ -115,7 +115,7 @@ async function follow() {
 }
 
 /** The words under a frame go when its content is there. */
-function frames() {
+function waitForFrames() {
   for (const words of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-waits-for]"))) {
     const frame = document.getElementById(words.dataset.waitsFor ?? "");
     frame?.addEventListener("load", () => words.remove());
@@ -125,5 +125,5 @@ function frames() {
 localise();
 limitSlider();
 dropping();
-frames();
+waitForFrames();
 void follow();
