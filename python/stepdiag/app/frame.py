@@ -12,7 +12,9 @@ from starlette.responses import HTMLResponse
 from stepdiag._core import __version__
 from stepdiag.book.book import Entry
 from stepdiag.book.facts import CalibrationFacts
+from stepdiag.book.trend import Trend
 from stepdiag.presentation.page.html import Markup, element, markup
+from stepdiag.presentation.page.preview import ticks
 from stepdiag.style import COLOUR
 
 # Of a verdict of a fit or of a machine: the class of its look, and the sign beside the words.
@@ -141,6 +143,47 @@ def action(label: str, target: str, *, main: bool = False, **fields: str) -> Mar
 
 def file_address(entry: Entry) -> str:
     return address(entry.machine, "file", *entry.file.split("/"))
+
+
+def trend_figure(trend: Trend, limit: float | None) -> Markup:
+    """Values with their 95 % bars against time, the line through them where it is significant, and the limit."""
+    width, height, left, right, top, bottom = 720.0, 220.0, 64.0, 704.0, 12.0, 190.0
+    days = [(one.day - trend.points[0].day).days for one in trend.points]
+    ends = [(one.value - 1.96 * (one.u or 0.0), one.value + 1.96 * (one.u or 0.0)) for one in trend.points]
+    low = min(*(a for a, _ in ends), *([0.0, limit] if limit is not None else []), ends[0][0])
+    high = max(*(b for _, b in ends), *([limit] if limit is not None else []), ends[0][1])
+    room = 0.06 * (high - low) or 1.0
+    low, high = low - (room if limit is None else 0.0), high + room
+
+    def x(value: float) -> str:
+        return f"{left + 12.0 + (right - left - 24.0) * value / max(days[-1], 1):.1f}"
+
+    def y(value: float) -> str:
+        return f"{bottom - (bottom - top) * (value - low) / (high - low):.1f}"
+
+    parts: list[Markup | None] = []
+    for tick in ticks(low, high):
+        parts.append(element("line", x1=left, x2=right, y1=y(tick), y2=y(tick), class_="grid"))
+        parts.append(
+            element(
+                "text", f"{tick:.6g}".replace("-", "−"), x=left - 8, y=f"{float(y(tick)) + 4.0:.1f}", text_anchor="end"
+            )
+        )
+    if limit is not None:
+        parts.append(element("line", x1=left, x2=right, y1=y(limit), y2=y(limit), class_="limit"))
+        parts.append(element("text", "limit", x=right, y=f"{float(y(limit)) - 5.0:.1f}", text_anchor="end"))
+    if trend.drift is not None and trend.drift.is_significant:
+        a, b = (y(trend.drift.at(trend.points[k].day)) for k in (0, -1))
+        parts.append(element("line", x1=x(0), x2=x(days[-1]), y1=a, y2=b, class_="drift"))
+    for at, one, (below, above) in zip(days, trend.points, ends, strict=True):
+        look = "unlike" if one.unlike else "changed" if one in trend.changed else None
+        parts.append(element("line", x1=x(at), x2=x(at), y1=y(below), y2=y(above), class_="bar"))
+        parts.append(element("circle", cx=x(at), cy=y(one.value), r=6 if look == "changed" else 4, class_=look))
+    for k in (0, -1) if days[-1] else (0,):
+        anchor = "start" if k == 0 else "end"
+        parts.append(element("text", trend.points[k].day.isoformat(), x=x(days[k]), y=bottom + 20, text_anchor=anchor))
+    said = f"{trend.name} of {len(trend.points)} calibrations, {trend.unit}; the values stand in the table"
+    return element("svg", *parts, viewBox=f"0 0 {width:g} {height:g}", class_="trend", role="img", aria_label=said)
 
 
 def curve(values: Sequence[tuple[float, tuple[float, float] | None]], limit: float | None) -> Markup | None:

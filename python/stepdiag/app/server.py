@@ -30,6 +30,7 @@ from stepdiag.app.screens.job import job_screen
 from stepdiag.app.screens.machine import machine_screen
 from stepdiag.app.screens.machines import damaged, machines_screen, search_screen
 from stepdiag.app.screens.report import FIELDS, report_screen
+from stepdiag.app.screens.trend import trend_screen
 from stepdiag.app.security import ENTRANCE, REPORT_POLICY, Guard, TooLarge
 from stepdiag.book.book import Book, Entry, MachineFolder
 from stepdiag.book.layout import main_file, safe_name
@@ -87,6 +88,9 @@ class App:
 
     def show_calibration(self, request: Request) -> Response:
         return calibration_screen(*self.calibration(request))
+
+    def show_trend(self, request: Request) -> Response:
+        return trend_screen(self.machine(request))
 
     def show_report(self, request: Request) -> Response:
         return report_screen(*self.calibration(request))
@@ -249,6 +253,7 @@ def application(book: Path, temporary: Path, port: int, token: str) -> Guard:
         Route("/machines", _told(app.new_machine), methods=["POST"]),
         Route(machine, _told(app.show_machine)),
         Route(f"{machine}/calibration/{{name}}", _told(app.show_calibration)),
+        Route(f"{machine}/trend", _told(app.show_trend)),
         Route(f"{machine}/figures/{{name}}", _told(app.figures)),
         Route(f"{machine}/report/{{name}}", _told(app.show_report)),
         Route(f"{machine}/file/{{file:path}}", _told(app.file)),

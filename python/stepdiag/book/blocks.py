@@ -7,6 +7,7 @@ from stepdiag.book.book import Entry
 from stepdiag.book.facts import CalibrationFacts, Value
 from stepdiag.book.layout import FOLDERS
 from stepdiag.book.overview import Overview
+from stepdiag.book.trend import FEWEST, Due, Trend
 from stepdiag.parameters import SQUARENESSES
 from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock, VerdictBlock
 
@@ -31,7 +32,7 @@ def machines_blocks(rows: Sequence[Overview]) -> Iterator[Block]:
                 _largest(facts),
                 _number(row.about.limit_um),
                 row.verdict or _NOT_KNOWN,
-                row.due.isoformat() if row.due else _NOT_KNOWN,
+                row.due.day.isoformat() if row.due.day else _NOT_KNOWN,
             )
         )
     yield TableBlock(tuple(cells), columns, left=(0, 1, 2, 3, 6, 7))
@@ -53,7 +54,7 @@ def machine_blocks(row: Overview, entries: Sequence[Entry]) -> Iterator[Block]:
         ("customer", row.about.customer),
         ("place", row.about.place),
         ("notes", row.about.notes),
-        ("due", row.due.isoformat() if row.due else None),
+        ("due", due_text(row.due)),
     ):
         if text:
             yield RowBlock(label, text)
@@ -69,6 +70,49 @@ def machine_blocks(row: Overview, entries: Sequence[Entry]) -> Iterator[Block]:
     if others:
         yield HeadingBlock("Other files")
         yield from (RowBlock(one.file, f"{one.date[:10]}, {_said(one)}") for one in others)
+
+
+def due_text(found: Due) -> str:
+    """When to calibrate again, and why then."""
+    day = found.day.isoformat() if found.day else ""
+    return {
+        "limit": f"{day}: the trend may reach the limit",
+        "interval": f"{day}: the stated interval ends",
+        "not enough to say": f"not enough to say: a trend needs {FEWEST} calibrations with uncertainties",
+        "no limit": "",
+        "not in sight": "the trend does not reach the limit within 20 years",
+    }[found.why]
+
+
+def trend_blocks(found: Sequence[Trend], due: Due) -> Iterator[Block]:
+    """The trend of each quantity, and its values."""
+    if not found:
+        yield NoteBlock("no calibration that can be used")
+        return
+    if due_text(due):
+        yield RowBlock("due", due_text(due))
+    yield HeadingBlock("Trends")
+    yield TableBlock(
+        tuple((one.name, one.unit, str(len(one.points)), *_drift_cells(one)) for one in found),
+        ("quantity", "unit", "values", "a year", "trend", "changed"),
+        left=(0, 1, 4, 5),
+    )
+    yield HeadingBlock("Values")
+    for one in found:
+        rows = [
+            (point.day.isoformat(), _value((point.value, point.u)), point.entry.name, point.unlike)
+            for point in one.points
+        ]
+        yield TableBlock(tuple(rows), ("day", one.unit, "file", "not compared"), f"{one.name}", left=(0, 2, 3))
+
+
+def _drift_cells(found: Trend) -> tuple[str, str, str]:
+    changed = ", ".join(one.day.isoformat() for one in found.changed) or "no"
+    if found.drift is None:
+        return _NOT_KNOWN, "not enough to say", changed if len(found.points) > 1 else _NOT_KNOWN
+    line = found.drift
+    said = "significant" if line.is_significant else "not significant"
+    return f"{line.per_year:.2g} ± {2.0 * line.u_per_year:.2g}", said, changed
 
 
 def _calibration_cells(entry: Entry, row: Overview) -> tuple[str, ...]:

@@ -1,15 +1,16 @@
 """How a machine is now, and when it is due."""
 
 from dataclasses import dataclass
-from datetime import date, timedelta
 from typing import Final
 
 from stepdiag.book.book import Entry, MachineFolder
 from stepdiag.book.index import Progress
 from stepdiag.book.machine_keys import AboutMachine
+from stepdiag.book.trend import Due, due, trends
 from stepdiag.calibration.volume import Verdict
 
 KIND: Final = "calibration"
+_OF_TREND: Final = 20  # calibrations, the last ones
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Overview:
     about: AboutMachine
     last: Entry | None
     verdict: Verdict | None  # of the last calibration against the limit; none: cannot be said
-    due: date | None
+    due: Due
 
 
 def is_usable(calibration: Entry) -> bool:
@@ -31,14 +32,10 @@ def is_usable(calibration: Entry) -> bool:
 
 def overview(machine: MachineFolder, progress: Progress | None = None) -> Overview:
     about = machine.about
-    calibrations = reversed([one for one in machine.entries("calibrations", progress=progress) if one.kind == KIND])
-    last = next((one for one in calibrations if is_usable(one)), None)
+    calibrations = [one for one in machine.entries("calibrations", progress=progress) if one.kind == KIND]
+    last = next((one for one in reversed(calibrations) if is_usable(one)), None)
     facts = last.facts.calibration if last else None
     verdict = facts.verdict(about.limit_um) if facts else None
-    return Overview(machine.name, about, last, verdict, _due(last, about))
-
-
-def _due(last: Entry | None, about: AboutMachine) -> date | None:
-    if last is None or about.interval_days is None:
-        return None
-    return date.fromisoformat(last.date[:10]) + timedelta(days=about.interval_days)
+    found = trends(calibrations[-_OF_TREND:])
+    largest = found[0] if found and found[0].name == "largest error" else None
+    return Overview(machine.name, about, last, verdict, due(largest, last, about.limit_um, about.interval_days))

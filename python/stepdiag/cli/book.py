@@ -109,6 +109,30 @@ def show(machine: str, removed: bool, book: Path | None) -> None:
     _tell_index(found.book)
 
 
+@book.command(short_help="Show how a machine changes.", epilog="\b\nExample: stepdiag book trend VMC-1200")
+@click.argument("machine")
+@BOOK
+def trend(machine: str, book: Path | None) -> None:
+    """Show how MACHINE changes from calibration to calibration, and when it is due.
+
+    Largest error in the volume, squarenesses, slopes of positioning and temperatures: their change a
+    year with its expanded uncertainty, and significant changes. Due is the first day on which the
+    trend of the largest error may reach the limit, but not later than the stated interval.
+    """
+    from stepdiag.book.blocks import trend_blocks
+    from stepdiag.book.book import find_book
+    from stepdiag.book.overview import overview
+    from stepdiag.book.trend import trends
+    from stepdiag.presentation.blocks import text_of
+
+    found = find_book(book).machine(machine)
+    with Progress(f"files of {found.name}") as progress:
+        row = overview(found, progress=progress)
+    for line in text_of(trend_blocks(trends(found.listed("calibrations")), row.due)):
+        say(line)
+    _tell_index(found.book)
+
+
 @book.command(
     short_help="Take in files.", epilog="\b\nExample: stepdiag book add --machine VMC-1200 scenario.toml run.csv"
 )

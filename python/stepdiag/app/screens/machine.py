@@ -15,6 +15,7 @@ from stepdiag.app.frame import (
     page,
     verdict,
 )
+from stepdiag.book.blocks import due_text
 from stepdiag.book.book import Entry, MachineFolder
 from stepdiag.book.facts import Value
 from stepdiag.book.layout import FOLDERS
@@ -73,7 +74,7 @@ def _about(row: Overview) -> Markup | None:
         )
         if text
     ]
-    pairs += [("Due", day(row.due))] if row.due else []
+    pairs += [("Due", due_text(row.due))] if due_text(row.due) else []
     return definitions(pairs, "facts") if pairs else None
 
 
@@ -117,7 +118,8 @@ def _calibrations(row: Overview, entries: list[Entry]) -> Markup | None:
         return None
     heading = ("File", "Day", "Fit", "Largest error", "Machine", *(f"{n}, µrad" for n in SQUARENESSES), "")
     small = curve(errors[-20:], row.about.limit_um)
-    return section("calibrations", "Calibrations", small, data_table("The latest first", heading, cells))
+    link = element("p", element("a", "Trend", href=address(row.name, "trend"), class_="button"))
+    return section("calibrations", "Calibrations", small, link, data_table("The latest first", heading, cells))
 
 
 def _runs(name: str, entries: list[Entry]) -> Markup | None:

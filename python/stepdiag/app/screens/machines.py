@@ -78,11 +78,10 @@ def _card(machine: MachineFolder, row: Overview) -> Markup:
             element("p", "Largest error ", largest_error(facts), " on ", day(row.last.date)),
             element("p", f"{x:g} × {y:g} × {z:g} mm", class_="quiet"),
         ]
-    if row.due is not None:
-        overdue = row.due < date.today()
-        said.append(
-            element("p", "Overdue since " if overdue else "Due ", day(row.due), class_="late" if overdue else None)
-        )
+    if row.due.day is not None:
+        overdue = row.due.day < date.today()
+        words = "Overdue since " if overdue else "Due "
+        said.append(element("p", words, day(row.due.day), class_="late" if overdue else None))
     return element(
         "li",
         element("h2", element("a", row.name, href=address(row.name))),

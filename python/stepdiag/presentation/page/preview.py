@@ -77,7 +77,7 @@ def _range(axis: Mapping[str, Any], values: Iterable[float | None]) -> tuple[flo
     return low - margin, high + margin
 
 
-def _ticks(low: float, high: float) -> list[float]:
+def ticks(low: float, high: float) -> list[float]:
     """Round numbers in the range, at most MOST_TICKS or so."""
     rough = (high - low) / MOST_TICKS
     power = 10.0 ** math.floor(math.log10(rough))
@@ -86,7 +86,7 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def _axis_x(axis: Mapping[str, Any], low: float, high: float, at: Any, top: float, bottom: float) -> list[Markup]:
-    values: Sequence[float] = axis.get("tickvals") or _ticks(low, high)
+    values: Sequence[float] = axis.get("tickvals") or ticks(low, high)
     texts = axis.get("ticktext") or [_label(value) for value in values]
     lines = [element("path", d=f"M{at(low):.1f} {bottom}H{at(high):.1f}", stroke=axis["linecolor"])]
     for value, text in zip(values, texts, strict=True):
@@ -98,7 +98,7 @@ def _axis_x(axis: Mapping[str, Any], low: float, high: float, at: Any, top: floa
 
 def _axis_y(axis: Mapping[str, Any], low: float, high: float, at: Any, left: float, right: float) -> list[Markup]:
     lines = []
-    for value in _ticks(low, high):
+    for value in ticks(low, high):
         colour = axis["zerolinecolor"] if value == 0.0 else GRID
         lines.append(element("path", d=f"M{left} {at(value):.1f}H{right}", stroke=colour))
         lines.append(element("text", _label(value), x=left - 6, y=f"{at(value) + 4:.1f}", text_anchor="end"))
