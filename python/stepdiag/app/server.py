@@ -26,6 +26,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.app.frame import STATIC, address, static_text
 from stepdiag.app.jobs import Job, Jobs
 from stepdiag.app.screens.calibration import calibration_screen
+from stepdiag.app.screens.compensate import FORMATS, NONE, compensate_screen
 from stepdiag.app.screens.job import job_screen
 from stepdiag.app.screens.machine import machine_screen
 from stepdiag.app.screens.machines import damaged, machines_screen, search_screen
@@ -88,6 +89,9 @@ class App:
 
     def show_calibration(self, request: Request) -> Response:
         return calibration_screen(*self.calibration(request))
+
+    def show_compensate(self, request: Request) -> Response:
+        return compensate_screen(*self.calibration(request))
 
     def show_trend(self, request: Request) -> Response:
         return trend_screen(self.machine(request))
@@ -192,6 +196,22 @@ class App:
             f"Report of {entry.name}", [words], machine.name, address(machine.name, "result") + "/{file}"
         )
 
+    async def export(self, request: Request) -> Response:
+        """Not before the controller's present table is in the book, or the person has said that there is none."""
+        machine, given = await asyncio.to_thread(self.machine, request), await _form(request)
+        entry, to, replaced = self.entry(machine, given.get("file", "")), given.get("to", ""), given.get("replaces", "")
+        if to not in FORMATS:
+            raise NotHere(f"There is no format {to}.")
+        if not replaced:
+            raise NotHere("First keep the table that the controller has now, or say that it has none.")
+        words = ["export", *self._of(machine), entry.file, "--to", to]
+        words += ["--replaces", self.entry(machine, replaced).file] if replaced != NONE else []
+        words += ["--incomplete"] if given.get("incomplete") else []
+        fields = FORMATS[to][1]
+        words += _options(given, [field for field in fields if field != "at"])
+        words += ["--at", *given["at"].replace(",", " ").split()] if "at" in fields and given.get("at") else []
+        return self._begin(f"Table for {to}", [words], machine.name, "")
+
     async def remove(self, request: Request) -> Response:
         return await self._moved(request, "remove")
 
@@ -253,6 +273,7 @@ def application(book: Path, temporary: Path, port: int, token: str) -> Guard:
         Route("/machines", _told(app.new_machine), methods=["POST"]),
         Route(machine, _told(app.show_machine)),
         Route(f"{machine}/calibration/{{name}}", _told(app.show_calibration)),
+        Route(f"{machine}/compensate/{{name}}", _told(app.show_compensate)),
         Route(f"{machine}/trend", _told(app.show_trend)),
         Route(f"{machine}/figures/{{name}}", _told(app.figures)),
         Route(f"{machine}/report/{{name}}", _told(app.show_report)),
@@ -262,6 +283,7 @@ def application(book: Path, temporary: Path, port: int, token: str) -> Guard:
         Route(f"{machine}/evaluate", _told(app.evaluate), methods=["POST"]),
         Route(f"{machine}/compare", _told(app.compare), methods=["POST"]),
         Route(f"{machine}/reports", _told(app.report), methods=["POST"]),
+        Route(f"{machine}/exports", _told(app.export), methods=["POST"]),
         Route(f"{machine}/remove", _told(app.remove), methods=["POST"]),
         Route(f"{machine}/restore", _told(app.restore), methods=["POST"]),
         Route("/jobs/{job}", _told(app.show_job)),

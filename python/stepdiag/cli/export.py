@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from stepdiag._core import InvalidArgument
 from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.options import (
     PATH,
@@ -76,11 +77,24 @@ def _ending(params: Mapping[str, Any]) -> str:
     metavar="OUT",
     help="File to write (.csv; .hal for matrix and calibxyzkins); for linuxcnc-comp a folder.",
 )
+@click.option(
+    "--replaces",
+    type=PATH,
+    metavar="TABLE",
+    help="The table that the controller has now: is kept as it is, and named, so that you can go back to it.",
+)
 @options_of(ExportOptions)
 @json_option
 @click.pass_context
 def export(
-    context: click.Context, /, calibration: Path, to: str, output: OutputFile, as_json: bool, **given: Any
+    context: click.Context,
+    /,
+    calibration: Path,
+    to: str,
+    output: OutputFile,
+    replaces: Path | None,
+    as_json: bool,
+    **given: Any,
 ) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
@@ -102,8 +116,11 @@ def export(
     from stepdiag.exporting.write import check_fit, read_what_is_exported, write_export
     from stepdiag.io.whole_files import check_input
 
+    inputs = [calibration, *([replaces] if replaces is not None else [])]
+    if replaces is not None and not replaces.exists():
+        raise InvalidArgument(f"{replaces}: cannot be read: no such file")
     if to in KINDS:
-        path = OutputFile(output.path, (KINDS[to],)).claim(calibration)
+        path = OutputFile(output.path, (KINDS[to],)).claim(*inputs)
     else:
         path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
     options = made_of(ExportOptions, given)
@@ -122,6 +139,8 @@ def export(
             tell("warning", line.removeprefix("warning: "))
         elif not as_json:
             say(line)
+    if replaces is not None and not as_json:
+        say(f"replaces {replaces}: load that one again to go back")
     tell_trust(context, calibration, read)
 
 

@@ -295,3 +295,44 @@ def test_without_the_packages_one_line_says_what_to_install(
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert run("app", "book") == 2
     assert "pip install 'stepdiag[app]'" in capsys.readouterr().err
+
+
+def test_compensation_asks_for_the_present_table_and_leads_back(person: TestClient) -> None:
+    machine = "/machines/VMC-1200"
+    ended(person, person.post(f"{machine}/evaluate", data={"run": "runs/run.csv"}))
+    (made,) = (MACHINE / "calibrations").iterdir()
+    screen = f"{machine}/compensate/{made.name}"
+    assert person.get(screen).status_code == 200
+    form = {"file": f"calibrations/{made.name}", "to": "squareness"}
+    refused = person.post(f"{machine}/exports", data=form)
+    assert refused.status_code == 404
+    assert "First keep the table that the controller has now" in refused.text
+    before = b"0.0 0.0 0.0\n100.0 0.001 0.001\n"
+    answer = person.post(f"{machine}/files", params={"name": "x.comp"}, content=before)
+    ended(person, httpx.Response(303, headers={"location": answer.json()["job"]}))
+    answer = person.post(f"{machine}/exports", data={**form, "replaces": "exports/x.comp"})
+    assert ended(person, answer)["status"] == 0
+    assert "largest error in the volume" in person.get(answer.headers["location"]).text, "what remains"
+    text = person.get(screen).text
+    assert "Bring back x.comp" in text
+    assert person.get(f"{machine}/file/exports/x.comp").content == before
+    table = next(path for path in (MACHINE / "exports").iterdir() if path.suffix == ".csv")
+    answer = person.post(f"{machine}/files", params={"name": "read.csv"}, content=table.read_bytes())
+    ended(person, httpx.Response(303, headers={"location": answer.json()["job"]}))
+    assert f"already in the book as exports/{table.name}" in person.get(answer.json()["job"]).text
+    answer = person.post(f"{machine}/exports", data={**form, "replaces": "none"})
+    assert ended(person, answer)["status"] == 0
+
+
+def test_formats_are_those_of_the_command() -> None:
+    from stepdiag.app.screens.compensate import FORMATS
+    from stepdiag.cli.export import FORMATS as OF_COMMAND
+
+    assert sorted(FORMATS) == sorted(OF_COMMAND)
+
+
+def test_trend_screen(person: TestClient) -> None:
+    machine = "/machines/VMC-1200"
+    assert "No calibration that can be used" in person.get(f"{machine}/trend").text
+    ended(person, person.post(f"{machine}/evaluate", data={"run": "runs/run.csv"}))
+    assert "C0Y, squareness of Y to X" in person.get(f"{machine}/trend").text

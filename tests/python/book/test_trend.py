@@ -1,4 +1,4 @@
-"""Trends: the line is that of weighted least squares, a drift that is there is found, and the limit is reached in time."""
+"""Trends: the line is that of weighted least squares, and the day on which the limit may be reached is the first."""
 
 from dataclasses import dataclass
 from datetime import date, timedelta

@@ -145,6 +145,7 @@ def _actions(name: str, entry: Entry, others: list[Entry]) -> Markup:
     return element(
         "div",
         element("a", "Make the report", href=address(name, "report", entry.name), class_="button main"),
+        element("a", "Compensate", href=address(name, "compensate", entry.name), class_="button"),
         compare if chosen else None,
         action("Remove", address(name, "remove"), file=entry.file),
         class_="actions",

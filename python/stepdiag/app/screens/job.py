@@ -4,7 +4,7 @@ import shlex
 
 from starlette.responses import HTMLResponse
 
-from stepdiag.app.frame import action, banner, page
+from stepdiag.app.frame import action, address, banner, page
 from stepdiag.app.jobs import Job
 from stepdiag.presentation.page.html import Markup, element
 
@@ -24,9 +24,12 @@ def job_screen(job: Job, machine: str, back: str) -> HTMLResponse:
         good = job.status == 0
         headline = "Done" if good else "Done, but the result must not be used"
         state = [banner("accepted" if good else "rejected", headline)]
-        state += (
-            [element("p", element("a", "Show the result", href=job.next, class_="button main"))] if job.next else []
-        )
+        files = [
+            element("a", file, href=address(machine, "file", *file.split("/")), download=True) for file in job.kept
+        ]
+        state += [element("ul", *(element("li", file) for file in files), class_="files")] if files and machine else []
+        if job.next:
+            state.append(element("p", element("a", "Show the result", href=job.next, class_="button main")))
     elif job.status in (130, -2):
         state = [banner("undecided", "Stopped", element("p", "Nothing was changed by the step that was stopped."))]
     else:

@@ -46,41 +46,46 @@ function limitSlider() {
 
 /** Files that are dropped or chosen go to the book one after the other. */
 function dropping() {
-  const field = /** @type {HTMLInputElement | null} */ (document.getElementById("files"));
-  const place = field?.closest(".drop");
-  const status = place?.querySelector("[role=status]");
-  if (!field || !place || !status) return;
-  /** @param {FileList | undefined | null} files */
-  const take = async (files) => {
-    for (const file of files ?? []) {
-      status.textContent = `${file.name} …`;
-      const answer = await fetch(`${field.dataset.target}?name=${encodeURIComponent(file.name)}`, {
-        method: "POST",
-        body: file,
-      });
-      if (!answer.ok) {
-        status.textContent = `${file.name}: ${await answer.text()}`;
-        return;
-      }
-      const { job } = await answer.json();
-      if (!(await ended(job, (doing) => (status.textContent = `${file.name}: ${doing}`)))) {
-        location.assign(job);
-        return;
-      }
+  for (const field of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll(".drop input[type=file]"))) {
+    const place = field.closest(".drop");
+    const status = place?.querySelector("[role=status]");
+    if (!place || !status) continue;
+    field.addEventListener("change", () => void take(field, status, field.files));
+    place.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      place.classList.add("over");
+    });
+    place.addEventListener("dragleave", () => place.classList.remove("over"));
+    place.addEventListener("drop", (event) => {
+      event.preventDefault();
+      place.classList.remove("over");
+      void take(field, status, /** @type {DragEvent} */ (event).dataTransfer?.files);
+    });
+  }
+}
+
+/**
+ * @param {HTMLInputElement} field says where files go, and whether what is said of them is shown
+ * @param {Element} status
+ * @param {FileList | undefined | null} files
+ */
+async function take(field, status, files) {
+  for (const file of files ?? []) {
+    status.textContent = `${file.name} …`;
+    const address = `${field.dataset.target}?name=${encodeURIComponent(file.name)}`;
+    const answer = await fetch(address, { method: "POST", body: file });
+    if (!answer.ok) {
+      status.textContent = `${file.name}: ${await answer.text()}`;
+      return;
     }
-    if (files?.length) location.reload();
-  };
-  field.addEventListener("change", () => void take(field.files));
-  place.addEventListener("dragover", (event) => {
-    event.preventDefault();
-    place.classList.add("over");
-  });
-  place.addEventListener("dragleave", () => place.classList.remove("over"));
-  place.addEventListener("drop", (event) => {
-    event.preventDefault();
-    place.classList.remove("over");
-    void take(/** @type {DragEvent} */ (event).dataTransfer?.files);
-  });
+    const { job } = await answer.json();
+    const good = await ended(job, (doing) => (status.textContent = `${file.name}: ${doing}`));
+    if (!good || "shows" in field.dataset) {
+      location.assign(job);
+      return;
+    }
+  }
+  if (files?.length) location.reload();
 }
 
 /**

@@ -1,0 +1,161 @@
+"""Compensate: what gets better, what remains, how do I go back?
+
+Before a table is made, the person gives the one that the controller has now, or says that it has none. It is kept in
+the book, and each table names the one that it replaces.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from starlette.responses import HTMLResponse
+
+from stepdiag.app.frame import address, banner, data_table, day, file_address, page
+from stepdiag.book.book import Entry, MachineFolder
+from stepdiag.presentation.page.html import Markup, element, markup, section
+
+# Format -> what it is, and the fields of the form that it uses beside those of all formats. A test compares them with
+# those of the command.
+FORMATS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
+    "linuxcnc-kins": ("LinuxCNC, all 21 errors (module stepdiagkins)", ()),
+    "linuxcnc-comp": ("LinuxCNC, positioning of each joint (COMP_FILE)", ("at",)),
+    "matrix": ("LinuxCNC, best matrix (matrixkins)", ()),
+    "calibxyzkins": ("LinuxCNC, linear and quadratic terms (calibxyzkins)", ()),
+    "isg": ("ISG kernel, TwinCAT CNC: volumetric compensation", ()),
+    "csv-grid": ("error vectors on a grid (CSV)", ("step",)),
+    "squareness": ("the three squarenesses (CSV)", ()),
+    "position-error": ("one axis along another (CSV)", ("axis", "depends_on", "at")),
+}
+NONE: Final = "none"  # the controller has no table
+
+
+def compensate_screen(machine: MachineFolder, entry: Entry) -> HTMLResponse:
+    facts = entry.facts.calibration
+    assert facts is not None
+    name = machine.name
+    rejected = facts.fit == "rejected" or facts.unverified
+    warning = (
+        banner(
+            "rejected",
+            "Do not compensate with this calibration",
+            element("p", "Its fit is rejected, or it is unverified."),
+        )
+        if rejected
+        else None
+    )
+    return page(
+        f"Compensate with {entry.name}",
+        warning,
+        _present(machine, entry),
+        None if rejected else _form(machine, entry),
+        _made(machine),
+        _read_back(name),
+        command=("export", "--machine", name, entry.name, "--to", "FORMAT", "--replaces", "TABLE"),
+        path=[
+            (address(name), name),
+            (address(name, "calibration", entry.name), entry.name),
+            (address(name, "compensate", entry.name), "Compensate"),
+        ],
+    )
+
+
+def _present(machine: MachineFolder, entry: Entry) -> Markup:
+    field = element("input", type="file", id="present", multiple=True, data_target=address(machine.name, "files"))
+    words = (
+        "Copy the compensation table that the controller has now, and drop it here. The book keeps it, so that you can "
+        "bring it back."
+    )
+    label = element("label", "The controller's present table:", for_="present")
+    return section(
+        "present",
+        "1. Keep what the controller has",
+        element("p", words),
+        element("div", label, field, element("p", "", role="status", class_="quiet"), class_="drop"),
+    )
+
+
+def _form(machine: MachineFolder, entry: Entry) -> Markup:
+    tables = [one for one in machine.listed() if one.folder in ("exports", "documents")]
+    kept = [element("option", "choose …", value="")]
+    kept += [element("option", "the controller has no table", value=NONE)]
+    kept += [element("option", f"{one.file} ({one.date[:10]})", value=one.file) for one in reversed(tables)]
+    formats = [element("option", f"{words} – {key}", value=key) for key, (words, _) in FORMATS.items()]
+    axes = [element("option", axis, value=axis) for axis in "XYZ"]
+    return section(
+        "table",
+        "2. Make the new table",
+        element(
+            "form",
+            _field("replaces", "It replaces", element("select", *kept, id="replaces", name="replaces", required=True)),
+            _field("to", "Controller", element("select", *formats, id="to", name="to")),
+            _field(
+                "at",
+                "Lines through X Y Z, mm (COMP_FILE, one axis)",
+                element("input", id="at", name="at", placeholder="centre"),
+            ),
+            _field(
+                "step",
+                "Spacing of the grid, mm",
+                element("input", id="step", name="step", type="number", min="0", step="any"),
+            ),
+            _field("axis", "Axis in error (one axis)", element("select", *axes, id="axis", name="axis")),
+            _field("depends_on", "Along axis (one axis)", element("select", *axes, id="depends_on", name="depends_on")),
+            element(
+                "p",
+                element("input", id="incomplete", name="incomplete", type="checkbox", value="yes"),
+                element("label", " Write 0 for what is not determined", for_="incomplete"),
+                class_="choice",
+            ),
+            element("p", element("button", "Make the table", class_="main")),
+            element("input", type="hidden", name="file", value=entry.file),
+            method="post",
+            action=address(machine.name, "exports"),
+            class_="fields",
+        ),
+        element("p", "The next page says what remains in the volume.", class_="quiet"),
+    )
+
+
+def _made(machine: MachineFolder) -> Markup | None:
+    rows = []
+    listed = {one.file: one for one in machine.listed(removed=True)}
+    for one in reversed([one for one in listed.values() if one.folder == "exports" and not one.removed]):
+        record = one.record
+        if record is None or record.command[1] != "export":
+            continue
+        before = [listed[given.file] for given in record.inputs if given.file in listed]
+        replaced = [given for given in before if given.folder in ("exports", "documents")]
+        made_from = [given.name for given in before if given.folder == "calibrations"]
+        back = [
+            element("a", f"Bring back {given.name}", href=file_address(given), download=True, class_="button")
+            for given in replaced
+        ]
+        rows.append(
+            (
+                element("a", one.name, href=file_address(one), download=True),
+                day(one.date),
+                ", ".join(made_from),
+                markup(*back) if back else "no table before",
+            )
+        )
+    if not rows:
+        return None
+    return section("made", "Tables", data_table("The latest first", ("Table", "Day", "From", "How to go back"), rows))
+
+
+def _read_back(name: str) -> Markup:
+    field = element("input", type="file", id="read-back", data_target=address(name, "files"), data_shows=True)
+    words = (
+        "After loading, copy the table from the controller and drop it here. “Already in the book as …” names the "
+        "table that it equals, byte for byte; otherwise it differs from all of them."
+    )
+    label = element("label", "The table read back:", for_="read-back")
+    return section(
+        "read-back-part",
+        "3. Check what the controller took",
+        element("p", words),
+        element("div", label, field, element("p", "", role="status", class_="quiet"), class_="drop"),
+    )
+
+
+def _field(name: str, label: str, control: Markup) -> Markup:
+    return element("p", element("label", label, for_=name), control)
