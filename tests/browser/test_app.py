@@ -91,13 +91,20 @@ def person(browser: Browser, running: Running) -> Iterator[Person]:
 
 
 def test_path_of_a_person(person: Person, files: Path, tmp_path: Path) -> None:
-    """New machine, import, verdict, report, second run: without an error, by few clicks."""
+    """New machine, plan, import, verdict, report, table, second run, trend: without an error, by few clicks."""
     page = person.page
+    person.click("link", "New machine")
     person.type("Name", "VMC 1200")
-    person.type("Serial number", "0815")
-    person.type("Limit of the largest error in the volume, µm", "90")
+    person.type("Limit, µm", "90")
     person.click("button", "Add the machine")
     person.heading("VMC 1200")
+    person.click("link", "Plan a measurement")
+    person.click("button", "Write the program")
+    person.heading("Done")
+    with page.expect_download() as program:
+        person.click("link", "plans/")
+    assert Path(program.value.path()).read_text().startswith("(Measuring program")
+    person.click("link", "VMC 1200")
     page.get_by_label("Drop runs").set_input_files([files / "scenario.toml", files / "first.csv"])
     person.clicks += 2
     person.heading("Runs")
@@ -118,6 +125,14 @@ def test_path_of_a_person(person: Person, files: Path, tmp_path: Path) -> None:
     with page.expect_download() as download:
         person.click("link", "reports/")
     assert "Example GmbH" in Path(download.value.path()).read_text()
+    person.click("link", page.locator("#calibrations tbody a").first.inner_text())
+    person.click("link", "Compensate")
+    page.get_by_label("It replaces").select_option("none")
+    person.clicks += 1
+    person.click("button", "Make the table")
+    person.heading("Done")
+    expect(page.get_by_role("link", name="exports/")).to_be_visible()
+    person.click("link", "VMC 1200")
     page.get_by_label("Drop runs").set_input_files(files / "second.csv")
     person.clicks += 2
     expect(page.get_by_role("link", name="second.csv")).to_be_visible(timeout=30_000)
@@ -127,6 +142,8 @@ def test_path_of_a_person(person: Person, files: Path, tmp_path: Path) -> None:
     expect(page.locator("#calibrations tbody tr")).to_have_count(2)
     expect(page.locator("svg.curve").first).to_be_visible()
     assert re.search(r"\d+,\d µm", page.locator("#calibrations tbody").inner_text()), "decimal comma of the person"
+    person.click("link", "Trend")
+    person.heading("Largest error in the volume")
     assert person.clicks <= 25
     assert person.errors == []
     assert person.foreign == []
@@ -134,7 +151,11 @@ def test_path_of_a_person(person: Person, files: Path, tmp_path: Path) -> None:
 
 SCREENS = {
     "machines": "/",
+    "new": "/new",
     "machine": "/machines/VMC%201200",
+    "plan": "/machines/VMC%201200/plan",
+    "trend": "/machines/VMC%201200/trend",
+    "compensate": "/machines/VMC%201200/compensate/{calibration}",
     "search": "/search?q=vmc",
     "report": "/machines/VMC%201200/report/{calibration}",
     "calibration": "/machines/VMC%201200/calibration/{calibration}",
@@ -159,7 +180,7 @@ def test_screens_can_be_used_by_everybody(
     assert found.violations_count == 0, found.generate_report()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     small = page.evaluate(
-        "[...document.querySelectorAll('button, input:not([type=hidden]):not([type=range]), select, .button')]"
+        "[...document.querySelectorAll('button, input:is([type=text], [type=number], [type=file]), select, .button')]"
         ".filter(one => one.checkVisibility() && one.getBoundingClientRect().height < 44).map(one => one.outerHTML)"
     )
     assert small == []

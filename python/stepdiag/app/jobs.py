@@ -52,7 +52,8 @@ class Job:
     async def _run(self) -> None:
         status = 0
         for words in self.commands:
-            status = max(status, await self._one(words)) if not self._stopped else 130
+            own = 130 if self._stopped else await self._one(words)
+            status = own if own not in (0, 3) else max(status, own)
             if status not in (0, 3):
                 break
         self.status = status
@@ -72,7 +73,8 @@ class Job:
         )
         streams = (self._process.stdout, self._process.stderr)
         await asyncio.gather(*(self._read(stream) for stream in streams if stream is not None))
-        return await self._process.wait()
+        status = await self._process.wait()
+        return status if status >= 0 else 128 - status  # ended by a signal
 
     async def _read(self, stream: asyncio.StreamReader) -> None:
         while line := await stream.readline():

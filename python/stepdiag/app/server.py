@@ -30,6 +30,8 @@ from stepdiag.app.screens.compensate import FORMATS, NONE, compensate_screen
 from stepdiag.app.screens.job import job_screen
 from stepdiag.app.screens.machine import machine_screen
 from stepdiag.app.screens.machines import damaged, machines_screen, search_screen
+from stepdiag.app.screens.new_machine import new_machine_screen
+from stepdiag.app.screens.plan import plan_screen
 from stepdiag.app.screens.report import FIELDS, report_screen
 from stepdiag.app.screens.trend import trend_screen
 from stepdiag.app.security import ENTRANCE, REPORT_POLICY, Guard, TooLarge
@@ -93,6 +95,20 @@ class App:
     def show_compensate(self, request: Request) -> Response:
         return compensate_screen(*self.calibration(request))
 
+    def show_new(self, request: Request) -> Response:
+        return new_machine_screen()
+
+    def show_plan(self, request: Request) -> Response:
+        return plan_screen(self.machine(request))
+
+    def picture(self, request: Request) -> Response:
+        """A PNG picture of the book, to look at."""
+        machine = self.machine(request)
+        entry = self.entry(machine, request.path_params["file"])
+        if entry.kind != "PNG picture":
+            raise NotHere(f"{entry.file} is no picture.")
+        return FileResponse(entry.path, media_type="image/png")
+
     def show_trend(self, request: Request) -> Response:
         return trend_screen(self.machine(request))
 
@@ -151,6 +167,12 @@ class App:
         given = await _form(request)
         words = ["book", "new", "--book", str(self._folder)]
         words += _options(given, ("title", "serial_number", "customer", "limit", "interval"))
+        travels = [given.get(f"travel_{axis}", "") for axis in "xyz"]
+        if all(travels):
+            words += [
+                f"--volume={','.join(travels)}",
+                *_options(given, ("chain", "head", "distance_noise", "tilt_noise")),
+            ]
         return self._begin("New machine", [[*words, "--", given.get("name", "")]], "", address(given.get("name", "")))
 
     async def upload(self, request: Request) -> Response:
@@ -172,6 +194,19 @@ class App:
         job = self._job_of(f"Import {name}", commands, machine.name, address(machine.name))
         return JSONResponse({"job": f"/jobs/{job.id}"})
 
+    async def plan(self, request: Request) -> Response:
+        """A search for plans, what the scenario's plan determines, or its program."""
+        machine, given = await asyncio.to_thread(self.machine, request), await _form(request)
+        what, of_machine = given.get("what", ""), self._of(machine)
+        if what == "observe":
+            return self._begin("What the plan determines", [["observe", *of_machine]], machine.name, "")
+        if what == "nc":
+            words = ["nc", *of_machine, *_options(given, ("dialect",))]
+            return self._begin("Measuring program", [words], machine.name, "")
+        name = await asyncio.to_thread(_free, machine, "plans", "plans", ".png")
+        words = ["plan", *of_machine, *_options(given, ("minutes",)), "-o", name]
+        return self._begin("Plans", [words], machine.name, "")
+
     async def evaluate(self, request: Request) -> Response:
         machine, given = await asyncio.to_thread(self.machine, request), await _form(request)
         run = self.entry(machine, given.get("run", ""))
@@ -189,7 +224,7 @@ class App:
         entry = self.entry(machine, given.get("file", ""))
         before = [self.entry(machine, given["before"]).file] if given.get("before") else []
         ending = ".pdf" if given.get("ending") == ".pdf" else ".html"
-        name = await asyncio.to_thread(_free, machine, Path(entry.name).stem, ending)
+        name = await asyncio.to_thread(_free, machine, "reports", Path(entry.name).stem, ending)
         words = ["report", *self._of(machine), *before, entry.file, "-o", name]
         words += _options(given, (*FIELDS, "limit"))
         return self._begin(
@@ -270,10 +305,14 @@ def application(book: Path, temporary: Path, port: int, token: str) -> Guard:
         Route("/", _told(app.machines)),
         Route("/search", _told(app.search)),
         Route("/static/{name}", _told(app.static)),
+        Route("/new", _told(app.show_new)),
         Route("/machines", _told(app.new_machine), methods=["POST"]),
         Route(machine, _told(app.show_machine)),
         Route(f"{machine}/calibration/{{name}}", _told(app.show_calibration)),
         Route(f"{machine}/compensate/{{name}}", _told(app.show_compensate)),
+        Route(f"{machine}/plan", _told(app.show_plan)),
+        Route(f"{machine}/plans", _told(app.plan), methods=["POST"]),
+        Route(f"{machine}/picture/{{file:path}}", _told(app.picture)),
         Route(f"{machine}/trend", _told(app.show_trend)),
         Route(f"{machine}/figures/{{name}}", _told(app.figures)),
         Route(f"{machine}/report/{{name}}", _told(app.show_report)),
@@ -376,10 +415,10 @@ def _options(given: Mapping[str, str], names: Iterable[str]) -> list[str]:
     return [f"--{name.replace('_', '-')}={given[name]}" for name in names if given.get(name)]
 
 
-def _free(machine: MachineFolder, stem: str, ending: str) -> str:
-    """A name for a report that is free."""
+def _free(machine: MachineFolder, folder: str, stem: str, ending: str) -> str:
+    """A name that is free."""
     from stepdiag.book.layout import release
 
-    path = machine.take("reports", f"{stem}{ending}")
+    path = machine.take(folder, f"{stem}{ending}")
     release(path)
     return path.name

@@ -257,17 +257,15 @@ class MachineFolder:
         except BaseException:
             _discard(target)
             raise
-        record = Record(
-            command=command,
-            begun=date_of_today(),
-            ended=date_of_today(),
-            status=0,
-            outputs=(self._file_record(target),),
-            taken_from=str(path.absolute()),
-            measured=measured,
-        )
-        records.keep(self.folder, record)
+        self._came_in(target, command, str(path.absolute()), measured)
         return self._at(target), True
+
+    def write(self, folder: str, name: str, text: str, *, command: tuple[str, ...]) -> Path:
+        """Write a new file. Returns its path."""
+        target = self.take(folder, name)
+        write_whole(target, text)
+        self._came_in(target, command, "", "")
+        return target
 
     def remove(self, entry: Entry, *, command: tuple[str, ...]) -> Path:
         """Move a file into the bin. Returns its place there."""
@@ -304,6 +302,11 @@ class MachineFolder:
         )
         records.keep(self.folder, record)
         return target
+
+    def _came_in(self, target: Path, command: tuple[str, ...], taken_from: str, measured: str) -> None:
+        now, made = date_of_today(), (self._file_record(target),)
+        record = Record(command=command, begun=now, ended=now, status=0, outputs=made)
+        records.keep(self.folder, record.model_copy(update={"taken_from": taken_from, "measured": measured}))
 
     def _file_record(self, path: Path) -> FileRecord:
         return FileRecord(file=self._name(path), sha256=fingerprint(path), facts=facts_of(path))

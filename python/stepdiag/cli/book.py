@@ -9,7 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.in_book import BOOK
-from stepdiag.cli.options import PATH, Command, InOrder, tell
+from stepdiag.cli.options import PATH, Command, InOrder, PointInMm, tell
 from stepdiag.cli.terminal import say
 from stepdiag.progress import Progress
 
@@ -53,11 +53,34 @@ def _about_options(command: Command) -> Command:
 @_about_options
 @click.option("--limit", type=float, metavar="UM", help="Limit of the largest error in the volume, µm.")
 @click.option("--interval", type=float, metavar="DAYS", help="Longest time between two calibrations, days.")
+@click.option("--volume", type=PointInMm(), help="Travels of X, Y and Z, mm: writes a scenario to measure it.")
+@click.option(
+    "--chain", metavar="CHAIN", help='Which axes carry the workpiece, such as "[w X\' b Y Z t]", of that scenario.'
+)
+@click.option("--head", metavar="NAME", help="Laser head of that scenario: a shipped one (see head list).")
+@click.option("--distance-noise", type=float, metavar="UM", help="Standard deviation of its distances, µm.")
+@click.option("--tilt-noise", type=float, metavar="URAD", help="Standard deviation of its tilts, µrad.")
 @BOOK
-def new(name: str, limit: float | None, interval: float | None, book: Path | None, **about: str | None) -> None:
+@click.pass_context
+def new(
+    context: click.Context,
+    /,
+    name: str,
+    limit: float | None,
+    interval: float | None,
+    volume: tuple[float, float, float] | None,
+    chain: str | None,
+    head: str | None,
+    distance_noise: float | None,
+    tilt_noise: float | None,
+    book: Path | None,
+    **about: str | None,
+) -> None:
     """Add the machine NAME to the book; --book names a new or empty folder to begin a book.
 
-    What is known of the machine is written to machines/NAME/machine.toml, which you can edit.
+    What is known of the machine is written to machines/NAME/machine.toml, which you can edit. With
+    --volume a scenario is written too, with a comment on every key and the defaults of `stepdiag
+    init`.
     """
     from stepdiag.book.book import Book, find_book
     from stepdiag.book.machine_keys import AboutMachine
@@ -66,8 +89,45 @@ def new(name: str, limit: float | None, interval: float | None, book: Path | Non
     words = {key: text for key, text in about.items() if text is not None}
     numbers = {key: number for key, number in (("limit_um", limit), ("interval_days", interval)) if number is not None}
     checked = check_keys({**words, **numbers}, AboutMachine, f"machine {name}")
+    of_scenario = {"chain": chain, "head": head, "distance_noise": distance_noise, "tilt_noise": tilt_noise}
+    scenario = None
+    if volume is not None:
+        scenario = _new_scenario(volume, chain, head, distance_noise, tilt_noise)
+    else:
+        for option, value in of_scenario.items():
+            if value is not None:
+                raise InvalidArgument(f"`{option}`: goes with --volume")
     machine = (find_book(None) if book is None else Book.make(book)).new_machine(name, checked)
     click.echo(f"wrote {machine.folder / 'machine.toml'}")
+    if scenario is not None:
+        command = ("stepdiag", *context.command_path.split()[1:], name)
+        path = machine.write("scenarios", "scenario.toml", scenario, command=command)
+        click.echo(f"wrote {path}")
+
+
+def _new_scenario(
+    volume: tuple[float, float, float],
+    chain: str | None,
+    head: str | None,
+    distance_noise: float | None,
+    tilt_noise: float | None,
+) -> str:
+    """The text. Raises InvalidArgument for what no scenario may have."""
+    from stepdiag.config.scenario_template import template
+    from stepdiag.head.description import find_shipped_head
+    from stepdiag.scenario.description import parse_scenario
+
+    if head is not None:
+        find_shipped_head(head)
+    stated = {
+        **{("volume", f"{axis}_mm"): travel for axis, travel in zip("xyz", volume, strict=True)},
+        ("machine", "chain"): chain,
+        ("noise", "distance_um"): distance_noise,
+        ("noise", "tilt_urad"): tilt_noise,
+    }
+    text = template(head, {place: value for place, value in stated.items() if value is not None})
+    parse_scenario(text, "scenario.toml")
+    return text
 
 
 @book.command("list", short_help="List the machines.", epilog="\b\nExample: stepdiag book list")

@@ -1,6 +1,7 @@
 """The commented new scenario, made from the scenario's keys."""
 
 import textwrap
+from collections.abc import Mapping
 from typing import Any, Final
 
 from pydantic.fields import FieldInfo
@@ -25,10 +26,13 @@ WHY: Final = (
 )
 
 
-def template(head: str | None = None) -> str:
-    """A complete scenario with a comment on every key; optional keys are commented out. `head`: a description."""
-    given = PLAN | ({("head", "layout"): None, ("head", "description"): head} if head else {})
-    offered = {*PLAN, ("head", "description" if head else "layout")}
+def template(head: str | None = None, values: Mapping[tuple[str, str], Any] | None = None) -> str:
+    """A complete scenario with a comment on every key; optional keys are commented out.
+
+    head: a description. values: of keys, by section and name, in place of the examples."""
+    stated = dict(values or {})
+    given = PLAN | ({("head", "layout"): None, ("head", "description"): head} if head else {}) | stated
+    offered = {*PLAN, ("head", "description" if head else "layout"), *stated}
     lines = [
         "# A scenario for stepdiag: machine, plan and head. The end of a key is its unit.",
         "",
@@ -36,7 +40,7 @@ def template(head: str | None = None) -> str:
     for name, field in keys(ScenarioKeys):
         lines += [*_comment(field.description or ""), f"{name} = {show_full(field.default)}", ""]
     for part in sections(ScenarioKeys):
-        active = part.required and "." not in part.title
+        active = (part.required and "." not in part.title) or any(section == part.title for section, _ in stated)
         why = _comment(WHY) if part.title == "plan" else []
         lines += [*_comment(paragraphs(part.model)), *why, f"{'' if active else '# '}[{_named(part)}]"]
         for name, field in keys(part.model):

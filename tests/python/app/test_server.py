@@ -9,6 +9,7 @@ import httpx
 import pytest
 from starlette.testclient import TestClient
 
+import stepdiag as sd
 from stepdiag.app import security
 from stepdiag.app.server import application
 from stepdiag.cli import main
@@ -222,10 +223,16 @@ def test_words_of_a_form_are_no_options(person: TestClient) -> None:
 
 # --- what it is for --------------------------------------------------------------------------------------------------
 def test_path_from_a_new_machine_to_the_report(person: TestClient, book: Path) -> None:
-    form = {"name": "Fräse 3", "limit": "60", "title": "VMC 800"}
+    form = {"name": "Fräse 3", "limit": "60", "title": "VMC 800", "head": "beam_and_psd", "chain": "[w X' Y' b Z t]"}
+    form |= {"travel_x": "400", "travel_y": "300", "travel_z": "250.5", "distance_noise": "0.2", "tilt_noise": "2"}
     state = ended(person, person.post("/machines", data=form))
     assert state == {"status": 0, "doing": "", "share": None, "next": "/machines/Fr%C3%A4se%203"}
+    made = sd.read_scenario("book/machines/Fräse 3/scenarios/scenario.toml").known
+    assert (made.chain.name, list(made.plan.volume)) == ("[w X' Y' b Z t]", [400.0, 300.0, 250.5])
     machine = str(state["next"])
+    answer = person.post(f"{machine}/plans", data={"what": "nc", "dialect": "iso"})
+    assert ended(person, answer)["status"] == 0
+    assert "plans/" in person.get(answer.headers["location"]).text
     for name in ("scenario.toml", "run.csv"):
         answer = person.post(f"{machine}/files", params={"name": name}, content=Path(name).read_bytes())
         ended(person, httpx.Response(303, headers={"location": answer.json()["job"]}))
@@ -336,3 +343,13 @@ def test_trend_screen(person: TestClient) -> None:
     assert "No calibration that can be used" in person.get(f"{machine}/trend").text
     ended(person, person.post(f"{machine}/evaluate", data={"run": "runs/run.csv"}))
     assert "C0Y, squareness of Y to X" in person.get(f"{machine}/trend").text
+
+
+def test_pictures_alone_are_shown_in_place(person: TestClient) -> None:
+    (MACHINE / "plans").mkdir()
+    (MACHINE / "plans/plans.png").write_bytes(b"\x89PNG\r\n\x1a\n1234")
+    (MACHINE / "plans/evil.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'><script>1</script></svg>")
+    shown = person.get("/machines/VMC-1200/picture/plans/plans.png")
+    assert (shown.status_code, shown.headers["content-type"]) == (200, "image/png")
+    for file in ("plans/evil.svg", "runs/run.csv", "../../BOOK.txt"):
+        assert person.get(f"/machines/VMC-1200/picture/{file}").status_code == 404

@@ -30,7 +30,7 @@ def job_screen(job: Job, machine: str, back: str) -> HTMLResponse:
         state += [element("ul", *(element("li", file) for file in files), class_="files")] if files and machine else []
         if job.next:
             state.append(element("p", element("a", "Show the result", href=job.next, class_="button main")))
-    elif job.status in (130, -2):
+    elif job.status in (130, 143):
         state = [banner("undecided", "Stopped", element("p", "Nothing was changed by the step that was stopped."))]
     else:
         state = [banner("damaged", "Not done", *(element("p", line) for line in job.said[-3:]))]

@@ -32,6 +32,7 @@ def machine_screen(machine: MachineFolder) -> HTMLResponse:
         name,
         _now(row),
         _about(row),
+        element("p", element("a", "Plan a measurement", href=address(name, "plan"), class_="button")),
         _import(name),
         _calibrations(row, entries),
         _runs(name, entries),

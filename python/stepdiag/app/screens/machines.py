@@ -17,24 +17,7 @@ _OF_CURVE: Final = 8  # calibrations
 def machines_screen(book: Book) -> HTMLResponse:
     cards = [_card(machine, overview(machine)) for machine in book.machines()]
     what = element("ul", *cards, class_="cards") if cards else element("p", "No machine yet.")
-    new = element(
-        "details",
-        element("summary", "New machine"),
-        element(
-            "form",
-            _field("name", "Name", required=True, maxlength=80),
-            _field("title", "Maker and type"),
-            _field("serial_number", "Serial number"),
-            _field("customer", "Customer"),
-            _field("limit", "Limit of the largest error in the volume, µm", type="number", min="0", step="any"),
-            _field("interval", "Days between two calibrations", type="number", min="1", step="1"),
-            element("button", "Add the machine", class_="main"),
-            method="post",
-            action="/machines",
-            class_="fields",
-        ),
-        open=not cards,
-    )
+    new = element("p", element("a", "New machine", href="/new", class_="button" if cards else "button main"))
     return page("Machines", what, new, command=("book", "list", "--book", str(book.folder)))
 
 
@@ -59,10 +42,6 @@ def _link(entry: Entry) -> Markup:
     if entry.folder == "calibrations" and entry.kind == "calibration" and not entry.removed:
         return element("a", entry.name, href=address(entry.machine, "calibration", entry.name))
     return element("a", entry.file, href=file_address(entry), download=True)
-
-
-def _field(name: str, label: str, **attributes: object) -> Markup:
-    return element("p", element("label", label, for_=name), element("input", id=name, name=name, **attributes))
 
 
 def _card(machine: MachineFolder, row: Overview) -> Markup:
