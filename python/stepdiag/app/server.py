@@ -365,7 +365,7 @@ def _listening(port: int) -> socket.socket:
         listener.bind(("127.0.0.1", port))
     except OSError as error:
         listener.close()
-        raise InvalidArgument(f"--port {port}: cannot listen: {error.strerror}") from None
+        raise InvalidArgument(f"`port` {port}: cannot listen: {error.strerror}") from None
     return listener
 
 

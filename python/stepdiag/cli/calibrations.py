@@ -24,6 +24,7 @@ from stepdiag.io.outputs import CALIBRATION, COMPARISON, FUNCTIONAL_POINT, PAGE,
 from stepdiag.progress import Progress
 
 _WORDS = {
+    "number": "Number of the report or certificate.",
     "customer": "Who receives the report.",
     "machine_type": "Maker and type of the machine.",
     "serial_number": "Serial number of the machine.",
@@ -31,6 +32,7 @@ _WORDS = {
     "instrument": "Instrument, with its serial number.",
     "certificate": "Calibration certificate of the instrument.",
     "conditions": "Conditions of the measurement.",
+    "signatures": "Who signs, with semicolons between them: lines at the end of the page.",
 }
 
 

@@ -9,6 +9,7 @@ from stepdiag.presentation.page.html import element
 
 # Name of the field -> label, and what machine.toml calls it.
 FIELDS = {
+    "number": ("Number of the report", None),
     "customer": ("Customer", "customer"),
     "machine_type": ("Maker and type of the machine", "title"),
     "serial_number": ("Serial number", "serial_number"),
@@ -16,6 +17,7 @@ FIELDS = {
     "instrument": ("Instrument, with its serial number", None),
     "certificate": ("Calibration certificate of the instrument", None),
     "conditions": ("Conditions of the measurement", None),
+    "signatures": ("Who signs (semicolons between names)", None),
 }
 
 

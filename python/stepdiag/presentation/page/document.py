@@ -40,6 +40,7 @@ from stepdiag.presentation.page.words import (
     method_section,
     open_section,
     provenance_section,
+    signatures_block,
     summary_section,
     verdict_block,
 )
@@ -71,7 +72,8 @@ def report(
         uncertainty: file of an uncertainty result (.nc): the budget.
         limit: of the largest error in the volume, mm.
         logo: PNG or SVG picture.
-        header: what its header says: customer, machine, serial_number, operator, instrument, certificate, conditions.
+        header: what its header says: number, customer, machine, serial_number, operator, instrument, certificate,
+            conditions; signatures: who signs, with semicolons between them.
 
     Raises:
         InvalidArgument: files are not sound or do not belong together; the header has other keys; Plotly or Chromium
@@ -134,6 +136,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
         method_section(contents),
         provenance_section(contents),
         commands_section(contents, request.command(output)),
+        signatures_block(contents),
     ]
     data = [
         _json("stepdiag-figures", {"layout": dict(LAYOUT), "figures": figures.drawings, "colours": dict(COLOUR)}),
@@ -146,7 +149,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
         element("div", header_block(contents), verdict_block(contents), class_="opening"),
         _contents_list(contents),
         element("main", *sections, id="main"),
-        element("footer", element("p", f"Made by stepdiag {__version__}, {moment(contents.date)}.")),
+        element("footer", element("p", f"Made by stepdiag {__version__}, ", moment(contents.date), ".")),
         element(
             "noscript",
             element(
@@ -177,8 +180,11 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
 
 
 def _title(contents: Contents) -> str:
-    machine = contents.header.words.get("machine", "three-axis machine tool")
-    words = f"Calibration report: {machine}"
+    given = contents.header.words
+    machine = given.get("machine", "three-axis machine tool")
+    serial = f", no. {given['serial_number']}" if "serial_number" in given else ""
+    day = f", {contents.calibration.date[:10]}" if contents.calibration.date else ""
+    words = f"Calibration report{' ' + given['number'] if 'number' in given else ''}: {machine}{serial}{day}"
     return words if is_valid(contents.calibration) else f"{headline(contents.calibration)}. {words}"
 
 

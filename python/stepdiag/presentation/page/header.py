@@ -11,6 +11,7 @@ from stepdiag.config.report_keys import LONGEST, ReportSection
 from stepdiag.io.whole_files import read_bytes
 
 TITLES: Final[Mapping[str, str]] = {
+    "number": "Number",
     "customer": "Customer",
     "machine": "Machine",
     "serial_number": "Serial number",
@@ -18,6 +19,7 @@ TITLES: Final[Mapping[str, str]] = {
     "instrument": "Instrument",
     "certificate": "Certificate",
     "conditions": "Conditions",
+    "signatures": "Signatures",
 }
 _FLAGS: Final = {"machine": "machine_type"}  # --machine is that of the machine book
 LARGEST_LOGO: Final = 512 * 1024  # bytes; the page is to stay small

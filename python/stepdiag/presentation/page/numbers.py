@@ -4,6 +4,8 @@ import math
 import re
 from typing import Final
 
+from stepdiag.presentation.page.html import Markup, element
+
 # Half width of a two-sided 95 % interval of a normal distribution, in standard uncertainties.
 COVERAGE_FACTOR: Final = 1.959963984540054
 NBSP: Final = "\u00a0"  # no line ends between a number and its unit
@@ -36,7 +38,7 @@ def with_interval(value: float, uncertainty: float, unit: str) -> str:
     return f"{value:.{digits}f}{NBSP}±{NBSP}{half:.{digits}f}{NBSP}{unit}".replace("-", "−")
 
 
-def moment(date: str) -> str:
-    """A date of a file, 2026-11-22T23:52:08Z, as one reads it; another text as it is."""
+def moment(date: str) -> str | Markup:
+    """A date of a file, 2026-11-22T23:52:08Z, as one reads it; another text as it is. The script writes local time."""
     found = re.fullmatch(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d):\d\dZ", date)
-    return f"{found[1]} {found[2]} UTC" if found else date
+    return element("time", f"{found[1]} {found[2]} UTC", datetime=date) if found else date

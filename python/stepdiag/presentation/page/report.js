@@ -9,6 +9,12 @@
   const drawn = new Set();
   let printing = false;
 
+  // --- times, as the reader's clock has them ---
+  for (const time of document.querySelectorAll("time"))
+    time.textContent = new Date(time.dateTime).toLocaleString(undefined, {
+      year: "numeric", month: "2-digit", day: "2-digit", hour: "2-digit", minute: "2-digit", timeZoneName: "short",
+    });
+
   // --- curves and other flat figures ---
   const sizeOf = (div) => ({ width: div.clientWidth, height: div.clientHeight });
   function drawFlat(div) {

@@ -53,7 +53,9 @@ SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "uncheck
 def header_block(contents: Contents) -> Markup:
     """Title, logo, and who, which machine, with what."""
     calibration, words = contents.calibration, contents.header.words
-    pairs: list[tuple[str, object]] = [(title, words[key]) for key, title in TITLES.items() if key in words]
+    pairs: list[tuple[str, object]] = [
+        (title, words[key]) for key, title in TITLES.items() if key in words and key != "signatures"
+    ]
     pairs += [
         ("Calibrated volume", f"{' × '.join(position(edge) for edge in calibration.volume)} mm"),
         ("Kinematic chain", calibration.chain.name),
@@ -74,6 +76,15 @@ def header_block(contents: Contents) -> Markup:
         definitions(pairs, "facts"),
         id="top",
     )
+
+
+def signatures_block(contents: Contents) -> Markup | None:
+    """A line for each who signs."""
+    names = [name.strip() for name in contents.header.words.get("signatures", "").split(";") if name.strip()]
+    if not names:
+        return None
+    lines = [element("p", element("span", class_="line"), f"Date, signature: {name}") for name in names]
+    return section("signatures", "Signatures", element("div", *lines, class_="signatures"))
 
 
 def verdict_block(contents: Contents) -> Markup:

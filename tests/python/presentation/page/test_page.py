@@ -410,6 +410,20 @@ def test_header_is_that_of_the_scenario_unless_a_flag_says_otherwise(evaluated: 
             page_of(calibration=Path("calibration.nc"), scenario=Path("scenario.toml"))
 
 
+def test_certificate_has_number_date_and_lines_for_signatures(evaluated: Path) -> None:
+    words = {
+        "number": "2026-0042",
+        "machine_type": "VMC 800",
+        "serial_number": "0815",
+        "signatures": "A. Engineer; B <i>",
+    }
+    page = page_of(calibration=Path("calibration.nc"), words=words)
+    assert "Number 2026-0042" in page.text
+    assert "Date, signature: A. Engineer Date, signature: B <i>" in page.text
+    day = sd.read_calibration("calibration.nc").date[:10]
+    assert f"Calibration report 2026-0042: VMC 800, no. 0815, {day}" in page.text
+
+
 def test_damaged_details_of_a_file_are_refused_by_name(evaluated: Path) -> None:
     import xarray as xr
 
