@@ -44,7 +44,8 @@ BELOW: dict[str, set[str]] = {
     "selftest": {"uncertainty"},
     "presentation": {"figures", "acquisition", "positions", "evaluation", "exporting", "selftest"},
     "book": {"presentation"},
-    "app": {"book"},
+    "platform": set(),
+    "app": {"book", "platform"},
     "demo": {"presentation", "program", "linuxcnc", "twin"},
     "cli": {"demo", "progress", "importing", "app"},
     # What the package shows to specialists.

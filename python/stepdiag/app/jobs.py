@@ -4,13 +4,14 @@ import asyncio
 import os
 import re
 import secrets
-import signal
+import shutil
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
+
+from stepdiag.platform import OWN_GROUP, exit_code, interrupt
 
 _PROGRESS: Final = re.compile(r"stepdiag: progress: (.*?)(?: (\d+)/(\d+))?$")
 _KEPT: Final = re.compile(r"(?:stepdiag: note: |.*: )(?:kept as|already in the book as) (\S.*)$")
@@ -19,10 +20,14 @@ MOST_LINES: Final = 500
 MOST_JOBS: Final = 100  # that are remembered
 
 
-class Job:
-    """Commands one after the other, until one fails. `then`: the address to go to, where {file} is the last result."""
+class CommandJob:
+    """Commands one after the other, until one fails.
 
-    def __init__(self, title: str, commands: Sequence[Sequence[str]], folder: Path, then: str) -> None:
+    then: the address to go to, where {file} is the last result. uploaded: a folder that is not needed afterwards."""
+
+    def __init__(
+        self, title: str, commands: Sequence[Sequence[str]], folder: Path, then: str, uploaded: Path | None = None
+    ) -> None:
         self.id = secrets.token_urlsafe(9)
         self.title, self.commands, self._folder, self._then = title, commands, folder, then
         self.status: int | None = None  # exit code, once all is done
@@ -31,7 +36,7 @@ class Job:
         self.share: float | None = None  # of what it is doing, 0 to 1
         self.kept: list[str] = []  # files of the machine that it made
         self._process: asyncio.subprocess.Process | None = None
-        self._stopped = False
+        self._stopped, self._uploaded = False, uploaded
         self._task = asyncio.get_running_loop().create_task(self._run())
 
     @property
@@ -45,8 +50,7 @@ class Job:
         """As Ctrl-C does."""
         self._stopped = True
         if self._process is not None and self._process.returncode is None:
-            with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGINT)
+            interrupt(self._process.pid)
         await self._task
 
     async def _run(self) -> None:
@@ -56,6 +60,8 @@ class Job:
             status = own if own not in (0, 3) else max(status, own)
             if status not in (0, 3):
                 break
+        if self._uploaded is not None:
+            shutil.rmtree(self._uploaded, ignore_errors=True)
         self.status = status
 
     async def _one(self, words: Sequence[str]) -> int:
@@ -68,13 +74,12 @@ class Job:
             stderr=asyncio.subprocess.PIPE,
             cwd=self._folder,
             env={**os.environ, "STEPDIAG_PROGRESS": "lines", "NO_COLOR": "1"},
-            start_new_session=True,  # Ctrl-C at the server is not one at its commands
             limit=2**20,
+            **OWN_GROUP,
         )
         streams = (self._process.stdout, self._process.stderr)
         await asyncio.gather(*(self._read(stream) for stream in streams if stream is not None))
-        status = await self._process.wait()
-        return status if status >= 0 else 128 - status  # ended by a signal
+        return exit_code(await self._process.wait())
 
     async def _read(self, stream: asyncio.StreamReader) -> None:
         while line := await stream.readline():
@@ -95,16 +100,15 @@ class Jobs:
     """All jobs of a server, the last ones remembered."""
 
     def __init__(self) -> None:
-        self._jobs: dict[str, Job] = {}
+        self._jobs: dict[str, CommandJob] = {}
 
-    def begin(self, title: str, commands: Sequence[Sequence[str]], folder: Path, then: str) -> Job:
-        job = Job(title, commands, folder, then)
+    def add(self, job: CommandJob) -> CommandJob:
         self._jobs[job.id] = job
         for old in [one for one in self._jobs.values() if one.status is not None][:-MOST_JOBS]:
             del self._jobs[old.id]
         return job
 
-    def get(self, identifier: str) -> Job | None:
+    def get(self, identifier: str) -> CommandJob | None:
         return self._jobs.get(identifier)
 
     async def stop_all(self) -> None:

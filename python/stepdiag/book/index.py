@@ -76,7 +76,8 @@ class Index:
     def entries(self, machine: str) -> list[Indexed]:
         """The oldest first."""
         rows = self._rows(
-            "SELECT file, sha256, kind, date, record, facts FROM entries WHERE machine = ? ORDER BY date, file", machine
+            "SELECT file, sha256, kind, date, record, facts FROM entries WHERE machine = ? ORDER BY date, record, file",
+            machine,
         )
         try:
             return [Indexed(*row) for row in rows]

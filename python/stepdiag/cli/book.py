@@ -310,10 +310,9 @@ def app(book: Path | None, port: int, browser: bool) -> None:
     The pages come from this computer alone, and no other computer can open them. The address that is
     printed lets a browser in. Ctrl-C ends the application; what its commands have written stays.
     """
-    import webbrowser
-
     from stepdiag.app.dependencies import check_installed
     from stepdiag.book.book import Book, find_book
+    from stepdiag.platform import open_browser
 
     check_installed()
     from stepdiag.app.server import serve
@@ -324,6 +323,6 @@ def app(book: Path | None, port: int, browser: bool) -> None:
         click.echo(f"{folder}: {address} (Ctrl-C ends)")
         sys.stdout.flush()
         if browser:
-            webbrowser.open(address)
+            open_browser(address)
 
     serve(folder, port, opened)

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 
 import stepdiag as sd
 from stepdiag.app import security
-from stepdiag.app.server import application
+from stepdiag.app.routes import application
 from stepdiag.cli import main
 
 PORT, TOKEN = 8765, "first-address"

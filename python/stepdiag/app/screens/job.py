@@ -5,11 +5,11 @@ import shlex
 from starlette.responses import HTMLResponse
 
 from stepdiag.app.frame import action, address, banner, page
-from stepdiag.app.jobs import Job
+from stepdiag.app.jobs import CommandJob
 from stepdiag.presentation.page.html import Markup, element
 
 
-def job_screen(job: Job, machine: str, back: str) -> HTMLResponse:
+def job_screen(job: CommandJob, machine: str, back: str) -> HTMLResponse:
     """While it runs the script asks for its state, and goes on to its result."""
     running = job.status is None
     state: list[Markup | None] = []
