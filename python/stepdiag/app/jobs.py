@@ -57,6 +57,7 @@ class CommandJob:
         status = 0
         for words in self.commands:
             own = 130 if self._stopped else await self._one(words)
+            own = 130 if self._stopped and own not in (0, 3) else own  # however early it came
             status = own if own not in (0, 3) else max(status, own)
             if status not in (0, 3):
                 break
