@@ -4,6 +4,7 @@ Nothing in a book is replaced or deleted: a file gets a name that is free, and w
 change leaves a record. Several programs may use a book at once, because a name is taken by making its file.
 """
 
+import hashlib
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -30,7 +31,7 @@ from stepdiag.book.layout import (
     safe_name,
 )
 from stepdiag.book.machine_keys import AboutMachine, toml_of
-from stepdiag.book.records import FileRecord, Record, fingerprint
+from stepdiag.book.records import FileRecord, Record, fingerprint, fingerprint_of
 from stepdiag.config.toml_text import check_keys, parse_toml
 from stepdiag.io.data_files import date_of_today
 from stepdiag.io.whole_files import check_input, make_folder, read_bytes, read_text, write_whole
@@ -236,35 +237,33 @@ class MachineFolder:
         kind = kind_of_entry(path)
         if path.is_dir() and kind is None:
             raise InvalidArgument(f"{path}: expected a file, got a folder")
-        damaged = facts_of(path).damaged
-        if damaged:
-            raise InvalidArgument(f"{path}: {damaged}")
+        facts = facts_of(path)
+        if facts.damaged:
+            raise InvalidArgument(f"{path}: {facts.damaged}")
         companions = _named_by(path) if kind == "scenario" else {}
         content = {name: read_bytes(file) for file, name in companions.items()}  # before the file that needs them
         content |= _contents(path) if path.is_dir() else {path.name: read_bytes(path)}
         whole = path.is_dir() or bool(companions)
-        target = self.take(
-            folder_of(kind), safe_name(path.name if path.is_dir() or not whole else path.stem), as_folder=whole
-        )
+        sha256 = fingerprint_of(content) if whole else hashlib.sha256(content[path.name]).hexdigest()
+        twin = next((one for one in self.entries() if one.sha256 == sha256), None)
+        if twin is not None:
+            return twin, False
+        name = safe_name(path.name if path.is_dir() or not whole else path.stem)
+        target = self.take(folder_of(kind), name, as_folder=whole)
         try:
-            for name, data in content.items():
-                write_whole(target / name if whole else target, data)
-            sha256 = fingerprint(target)
-            twin = next((one for one in self.entries() if one.sha256 == sha256 and one.path != target), None)
-            if twin is not None:
-                _discard(target)
-                return twin, False
+            for inside, data in content.items():
+                write_whole(target / inside if whole else target, data)
         except BaseException:
             _discard(target)
             raise
-        self._came_in(target, command, str(path.absolute()), measured)
+        self._came_in(FileRecord(file=self._name(target), sha256=sha256, facts=facts), command, path, measured)
         return self._at(target), True
 
     def write(self, folder: str, name: str, text: str, *, command: tuple[str, ...]) -> Path:
         """Write a new file. Returns its path."""
         target = self.take(folder, name)
         write_whole(target, text)
-        self._came_in(target, command, "", "")
+        self._came_in(self._file_record(target), command)
         return target
 
     def remove(self, entry: Entry, *, command: tuple[str, ...]) -> Path:
@@ -303,9 +302,11 @@ class MachineFolder:
         records.keep(self.folder, record)
         return target
 
-    def _came_in(self, target: Path, command: tuple[str, ...], taken_from: str, measured: str) -> None:
-        now, made = date_of_today(), (self._file_record(target),)
-        record = Record(command=command, begun=now, ended=now, status=0, outputs=made)
+    def _came_in(
+        self, made: FileRecord, command: tuple[str, ...], source: Path | None = None, measured: str = ""
+    ) -> None:
+        now, taken_from = date_of_today(), "" if source is None else str(source.absolute())
+        record = Record(command=command, begun=now, ended=now, status=0, outputs=(made,))
         records.keep(self.folder, record.model_copy(update={"taken_from": taken_from, "measured": measured}))
 
     def _file_record(self, path: Path) -> FileRecord:

@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -69,13 +69,14 @@ def read(path: Path) -> Record:
 
 
 def fingerprint(entry: Path) -> str:
-    """SHA-256 of a file as `sha256sum` prints it; of a folder, of the names and the fingerprints of its files."""
+    """SHA-256 of a file as `sha256sum` prints it; of a folder as `fingerprint_of` its files."""
     if not entry.is_dir():
         with entry.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    text = "".join(f"{fingerprint(path)}  {path.name}\n" for path in _files(entry))
-    return hashlib.sha256(text.encode()).hexdigest()
+    return fingerprint_of({path.name: path.read_bytes() for path in entry.iterdir() if path.is_file()})
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    return (path for path in sorted(folder.iterdir()) if path.is_file())
+def fingerprint_of(contents: Mapping[str, bytes]) -> str:
+    """SHA-256 of what `sha256sum` prints of these files, in the order of their names."""
+    lines = (f"{hashlib.sha256(contents[name]).hexdigest()}  {name}\n" for name in sorted(contents))
+    return hashlib.sha256("".join(lines).encode()).hexdigest()

@@ -120,11 +120,11 @@ def _made(machine: MachineFolder) -> Markup | None:
     listed = {one.file: one for one in machine.listed(removed=True)}
     for one in reversed([one for one in listed.values() if one.folder == "exports" and not one.removed]):
         record = one.record
-        if record is None or record.command[1] != "export":
-            continue
-        before = [listed[given.file] for given in record.inputs if given.file in listed]
+        before = [listed[given.file] for given in record.inputs if given.file in listed] if record else []
         replaced = [given for given in before if given.folder in ("exports", "documents")]
         made_from = [given.name for given in before if given.folder == "calibrations"]
+        if not made_from:  # not made here
+            continue
         back = [
             element("a", f"Bring back {given.name}", href=file_address(given), download=True, class_="button")
             for given in replaced
