@@ -16,6 +16,8 @@ from stepdiag.platform import OWN_GROUP, exit_code, interrupt
 _PROGRESS: Final = re.compile(r"stepdiag: progress: (.*?)(?: (\d+)/(\d+))?$")
 _KEPT: Final = re.compile(r"(?:stepdiag: note: |.*: )(?:kept as|already in the book as) (\S.*)$")
 COMMAND: Final = ("-m", "stepdiag")
+MOST_ATTEMPTS: Final = 12  # to stop a command
+BETWEEN: Final = 0.4  # s
 MOST_LINES: Final = 500
 MOST_JOBS: Final = 100  # that are remembered
 
@@ -47,10 +49,13 @@ class CommandJob:
         return self._then.replace("{file}", quote(self.kept[-1]) if self.kept else "")
 
     async def stop(self) -> None:
-        """As Ctrl-C does."""
+        """As Ctrl-C does: again and again, as the process may just begin; at last it is killed."""
         self._stopped = True
-        if self._process is not None and self._process.returncode is None:
-            interrupt(self._process.pid)
+        for attempt in range(MOST_ATTEMPTS):
+            if self._process is not None and self._process.returncode is None:
+                interrupt(self._process.pid) if attempt < MOST_ATTEMPTS - 1 else self._process.kill()
+            if (await asyncio.wait([self._task], timeout=BETWEEN))[0]:
+                return
         await self._task
 
     async def _run(self) -> None:
