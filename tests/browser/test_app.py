@@ -205,12 +205,10 @@ def test_another_page_on_this_computer_gets_nothing(browser: Browser, running: R
     origin = running.address.split("/enter")[0]
     page = person.page.context.new_page()
     page.goto("data:text/html,<title>other</title>")
-    for script in (
-        f"fetch('{origin}/', {{credentials: 'include'}}).then(r => r.text()).catch(() => 'refused')",
-        f"fetch('{origin}/machines', {{method: 'POST', mode: 'no-cors', credentials: 'include', body: 'name=Evil'}})"
-        ".then(() => 'sent').catch(() => 'refused')",
-    ):
-        assert page.evaluate(script) in ("refused", "sent")
+    read = f"fetch('{origin}/', {{credentials: 'include'}}).then(r => r.text()).catch(() => 'refused')"
+    assert page.evaluate(read) == "refused"
+    options = "{method: 'POST', mode: 'no-cors', credentials: 'include', body: 'name=Evil'}"
+    page.evaluate(f"fetch('{origin}/machines', {options}).catch(() => '')")
     page.set_content(
         f"<iframe src='{origin}/'></iframe>"
         f"<form method=post action='{origin}/machines'><input name=name value=Evil></form>"

@@ -22,3 +22,15 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "scenario.toml").write_text(SCENARIO)
     assert main(["simulate", "scenario.toml", "-o", "run.csv"]) == 0
     return tmp_path
+
+
+@pytest.fixture
+def book(here: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The same folder, with a machine book of one machine, VMC-1200, that has scenario and run."""
+    monkeypatch.setenv("STEPDIAG_BOOK", str(here / "book"))
+    for command in (
+        ["new", "VMC-1200", "--book", "book", "--serial-number", "0815", "--limit", "20"],
+        ["add", "--machine", "VMC-1200", "scenario.toml", "run.csv"],
+    ):
+        assert main(["book", *command]) == 0
+    return here

@@ -78,7 +78,7 @@ def static_text(name: str) -> str:
     text = (files("stepdiag.app") / "static" / name).read_text(encoding="utf-8")
     if name != "app.css":
         return text
-    colours = " ".join(f"--{key}: {COLOUR[key]};" for key in ("accepted", "doubtful", "rejected", "after", "limit"))
+    colours = " ".join(f"--{key}: {COLOUR[key]};" for key in ("after", "limit"))
     return f":root {{ {colours} }}\n{text}"
 
 
@@ -97,9 +97,9 @@ def number(value: float, digits: int = 1) -> Markup:
     return element("data", f"{value:.{digits}f}", value=f"{value:.{digits}f}", class_="number")
 
 
-def verdict(word: str | None, about: str = "") -> Markup:
-    """A verdict in a list: a sign, a colour and the word."""
-    look, sign = _LOOKS.get(word or "", ("unsure", "–"))
+def verdict(word: str | None, about: str = "", caution: str = "") -> Markup:
+    """A verdict in a list: a sign, a colour and the word; with a caution it looks undecided."""
+    look, sign = _LOOKS.get("undecided" if caution else word or "", ("unsure", "–"))
     return element(
         "span", element("span", sign, aria_hidden="true"), f" {about}{word or 'not known'}", class_=f"mark {look}"
     )
@@ -123,22 +123,19 @@ def largest_error(facts: CalibrationFacts) -> Markup:
     return markup(number(found.value), " µm", interval)
 
 
-def data_table(caption: str, heading: Sequence[object], rows: Sequence[Sequence[object]]) -> Markup:
-    """A table that scrolls in itself where it is wider than the screen."""
-    head = element("thead", element("tr", *(element("th", cell, scope="col") for cell in heading)))
-    body = [
-        element("tr", element("th", first, scope="row"), *(element("td", cell) for cell in others))
-        for first, *others in rows
-    ]
-    whole = element("table", element("caption", caption), head, element("tbody", *body))
-    return element("div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption)
-
-
 def action(label: str, target: str, *, main: bool = False, **fields: str) -> Markup:
     """A button that changes something."""
     hidden = [element("input", type="hidden", name=name, value=value) for name, value in fields.items()]
     button = element("button", label, class_="main" if main else None)
     return element("form", *hidden, button, method="post", action=target, class_="action")
+
+
+def drop(identifier: str, label: str, machine: str, *, shows: bool = False) -> Markup:
+    """A place for files that go to the book. shows: what was said of a file is shown, also if all went well."""
+    target = address(machine, "files")
+    field = element("input", type="file", id=identifier, multiple=not shows, data_target=target, data_shows=shows)
+    said = element("p", "", role="status", class_="quiet")
+    return element("div", element("label", label, for_=identifier), field, said, class_="drop")
 
 
 def file_address(entry: Entry) -> str:
@@ -150,8 +147,8 @@ def trend_figure(trend: Trend, limit: float | None) -> Markup:
     width, height, left, right, top, bottom = 720.0, 220.0, 64.0, 704.0, 12.0, 190.0
     days = [(one.day - trend.points[0].day).days for one in trend.points]
     ends = [(one.value - 1.96 * (one.u or 0.0), one.value + 1.96 * (one.u or 0.0)) for one in trend.points]
-    low = min(*(a for a, _ in ends), *([0.0, limit] if limit is not None else []), ends[0][0])
-    high = max(*(b for _, b in ends), *([limit] if limit is not None else []), ends[0][1])
+    low = min([a for a, _ in ends] + ([0.0] if limit is not None else []))
+    high = max([b for _, b in ends] + ([limit] if limit is not None else []))
     room = 0.06 * (high - low) or 1.0
     low, high = low - (room if limit is None else 0.0), high + room
 

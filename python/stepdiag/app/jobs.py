@@ -25,13 +25,21 @@ MOST_JOBS: Final = 100  # that are remembered
 class CommandJob:
     """Commands one after the other, until one fails.
 
-    then: the address to go to, where {file} is the last result. uploaded: a folder that is not needed afterwards."""
+    machine: whose files they change; empty: none's. then: the address to go to, where {file} is the last result.
+    uploaded: a folder that is not needed afterwards."""
 
     def __init__(
-        self, title: str, commands: Sequence[Sequence[str]], folder: Path, then: str, uploaded: Path | None = None
+        self,
+        title: str,
+        commands: Sequence[Sequence[str]],
+        folder: Path,
+        machine: str = "",
+        then: str = "",
+        uploaded: Path | None = None,
     ) -> None:
         self.id = secrets.token_urlsafe(9)
-        self.title, self.commands, self._folder, self._then = title, commands, folder, then
+        self.title, self.commands, self.machine = title, commands, machine
+        self._folder, self._then = folder, then
         self.status: int | None = None  # exit code, once all is done
         self.said: list[str] = []
         self.doing = ""

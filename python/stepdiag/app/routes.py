@@ -7,6 +7,7 @@ never joined to a path.
 
 import asyncio
 import contextlib
+import hashlib
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from functools import wraps
@@ -26,7 +27,7 @@ from stepdiag.app.screens.calibration import calibration_screen
 from stepdiag.app.screens.compensate import FORMATS, NONE, compensate_screen
 from stepdiag.app.screens.job import job_screen
 from stepdiag.app.screens.machine import machine_screen
-from stepdiag.app.screens.machines import damaged, machines_screen, search_screen
+from stepdiag.app.screens.machines import machines_screen, refusal_screen, search_screen
 from stepdiag.app.screens.new_machine import new_machine_screen
 from stepdiag.app.screens.plan import plan_screen
 from stepdiag.app.screens.report import FIELDS, report_screen
@@ -36,7 +37,6 @@ from stepdiag.book.book import Book, Entry, MachineFolder
 from stepdiag.book.layout import main_file, safe_name
 
 SHEETS: Final = (".xlsx", ".ods", ".xls", ".txt", ".tsv")  # that `stepdiag import` reads
-Screen = Callable[..., Response]
 
 
 class NotHere(Exception):
@@ -50,7 +50,6 @@ class App:
         self._folder, self._temporary = book.absolute(), temporary
         self.jobs = Jobs()
         self._drawn: dict[str, asyncio.Lock] = {}
-        self._of_job: dict[str, tuple[str, str]] = {}
 
     # --- what is there ----------------------------------------------------------------------------------------------
     def machine(self, request: Request) -> MachineFolder:
@@ -113,9 +112,7 @@ class App:
         return report_screen(*self.calibration(request))
 
     def show_job(self, request: Request) -> Response:
-        job = self._job(request)
-        machine, back = self._of_job[job.id]
-        return job_screen(job, machine, back)
+        return job_screen(self._job(request))
 
     def job_state(self, request: Request) -> Response:
         job = self._job(request)
@@ -134,15 +131,16 @@ class App:
         return Response(static_text(name), media_type=STATIC[name])
 
     async def figures(self, request: Request) -> Response:
-        """The report page of a calibration, made once for each content of its file."""
+        """The report page of a calibration, made once for each content of its file and each limit."""
         machine, entry = await asyncio.to_thread(self.calibration, request)
-        page = self._temporary / f"{entry.sha256}.html"
-        async with self._drawn.setdefault(entry.sha256, asyncio.Lock()):
+        limit = machine.about.limit_um
+        given = [str(entry.path), *self._origins(machine, entry)]
+        given += ["--limit", f"{limit!r}"] if limit is not None else []
+        made = hashlib.sha256("\n".join((entry.sha256, *given)).encode()).hexdigest()
+        page = self._temporary / f"{made}.html"
+        async with self._drawn.setdefault(made, asyncio.Lock()):
             if not page.exists():
-                words = ["report", str(entry.path), "-o", str(page), *self._origins(machine, entry)]
-                limit = machine.about.limit_um
-                words += ["--limit", f"{limit:g}"] if limit is not None else []
-                job = CommandJob("report", [words], self._folder, "")
+                job = CommandJob("report", [["report", *given, "-o", str(page)]], self._folder)
                 while job.status is None:
                     await asyncio.sleep(0.05)
                     if await request.is_disconnected():
@@ -278,9 +276,7 @@ class App:
     def _job_of(
         self, title: str, commands: Sequence[Sequence[str]], machine: str, then: str, uploaded: Path | None = None
     ) -> CommandJob:
-        job = self.jobs.add(CommandJob(title, commands, self._folder, then, uploaded))
-        self._of_job[job.id] = machine, address(machine) if machine else "/"
-        return job
+        return self.jobs.add(CommandJob(title, commands, self._folder, machine, then, uploaded))
 
     def _job(self, request: Request) -> CommandJob:
         job = self.jobs.get(request.path_params["job"])
@@ -338,8 +334,8 @@ def _told(handler: Callable[[Request], Any]) -> Callable[[Request], Any]:
         if isinstance(error, TooLarge):
             return PlainTextResponse("The file is too large.", 413)
         if isinstance(error, NotHere):
-            return damaged("Not here", str(error), 404)
-        return damaged("This cannot be shown", str(error), 500)
+            return refusal_screen("Not here", str(error), 404)
+        return refusal_screen("This cannot be shown", str(error), 500)
 
     if asyncio.iscoroutinefunction(handler):
 

@@ -36,6 +36,7 @@ def machines_blocks(rows: Sequence[Overview]) -> Iterator[Block]:
             )
         )
     yield TableBlock(tuple(cells), columns, left=(0, 1, 2, 3, 6, 7))
+    yield from (NoteBlock(f"{row.name}: do not rely on its verdict: {row.caution}") for row in rows if row.caution)
 
 
 def machine_blocks(row: Overview, entries: Sequence[Entry]) -> Iterator[Block]:
@@ -48,6 +49,8 @@ def machine_blocks(row: Overview, entries: Sequence[Entry]) -> Iterator[Block]:
     else:
         why = f"largest error {_largest(facts)} µm on {row.last.date[:10]}, limit {_number(row.about.limit_um)} µm"
         yield VerdictBlock("machine", row.verdict or "unknown", row.verdict or "verdict not possible", why)
+    if row.caution:
+        yield NoteBlock(f"do not rely on this: {row.caution}")
     for label, text in (
         ("machine type", row.about.title),
         ("serial number", row.about.serial_number),

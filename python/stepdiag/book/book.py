@@ -25,7 +25,7 @@ from stepdiag.book.layout import (
     README,
     check_name,
     folder_of,
-    kind_of_entry,
+    main_file,
     move,
     reserve,
     safe_name,
@@ -234,13 +234,12 @@ class MachineFolder:
 
         Raises InvalidArgument for a damaged file."""
         check_input(path)
-        kind = kind_of_entry(path)
-        if path.is_dir() and kind is None:
-            raise InvalidArgument(f"{path}: expected a file, got a folder")
+        if path.is_dir() and not main_file(path).is_file():
+            raise InvalidArgument(f"{path}: expected a file, or the folder of an export or a scenario")
         facts = facts_of(path)
         if facts.damaged:
             raise InvalidArgument(f"{path}: {facts.damaged}")
-        companions = _named_by(path) if kind == "scenario" else {}
+        companions = _named_by(main_file(path)) if facts.kind == "scenario" and not path.is_dir() else {}
         content = {name: read_bytes(file) for file, name in companions.items()}  # before the file that needs them
         content |= _contents(path) if path.is_dir() else {path.name: read_bytes(path)}
         whole = path.is_dir() or bool(companions)
@@ -249,7 +248,7 @@ class MachineFolder:
         if twin is not None:
             return twin, False
         name = safe_name(path.name if path.is_dir() or not whole else path.stem)
-        target = self.take(folder_of(kind), name, as_folder=whole)
+        target = self.take(folder_of(facts.kind), name, as_folder=whole)
         try:
             for inside, data in content.items():
                 write_whole(target / inside if whole else target, data)
@@ -334,7 +333,7 @@ def find_book(given: Path | None) -> Book:
             return Book(folder)
     raise InvalidArgument(
         f"no machine book here: name its folder with `book`, or in the environment variable {VARIABLE}; "
-        "`stepdiag book new NAME` makes one"
+        "`stepdiag book new` with the name of a new folder makes one"
     )
 
 

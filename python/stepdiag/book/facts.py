@@ -5,19 +5,27 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from stepdiag._core import Calibration, InvalidArgument
-from stepdiag.book.layout import kind_of_entry, main_file
+from stepdiag.book.layout import main_file
 from stepdiag.calibration.volume import Verdict, decided, volume
 from stepdiag.config.key_types import Section
-from stepdiag.io.comp_set import check_set
-from stepdiag.io.data_files import read_calibration, read_measurement
+from stepdiag.io.file_kind import kind_of_file
+from stepdiag.presentation.file_check import examine
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
 FACTS: Final = 1  # of this module: changes where facts of an earlier program must be made again
 # Endings of files that stepdiag reads: one of another content is damaged.
 READ: Final = (".csv", ".nc", ".toml", ".jsonl")
+# Kinds that `stepdiag check` reads.
+EXAMINED: Final = (
+    "TOML file",
+    "measurement",
+    "calibration",
+    "error map",
+    "raw readings",
+    "table of target readings",
+    "compensation.ini",
+)
 
 # A value with its standard uncertainty (none: not known).
 Value = tuple[float, float | None]
@@ -48,9 +56,14 @@ class CalibrationFacts(Section):
     temperatures: tuple[float, ...] = ()  # of the scales, °C: of X, Y, Z as found, or the one they are referred to
     referred: bool = False
 
+    @property
+    def not_counted(self) -> str:
+        """Why it says nothing of the machine; empty if it does."""
+        return "rejected" if self.fit == "rejected" else "unverified" if self.unverified else ""
+
     def verdict(self, limit: float | None) -> Verdict | None:
         """Whether the machine is within the limit, µm; none where that cannot be said."""
-        if limit is None or self.fit == "rejected" or self.largest is None or self.largest.bounds is None:
+        if limit is None or self.not_counted or self.largest is None or self.largest.bounds is None:
             return None
         return decided(self.largest.bounds, limit)
 
@@ -69,38 +82,17 @@ class Facts(Section):
 
 def facts_of(entry: Path) -> Facts:
     """Read a file, or the main file of a folder. A damaged file has facts that say so; nothing is raised."""
-    kind = None
+    path, kind = main_file(entry), None
     try:
-        kind = kind_of_entry(entry)
-        return _read(entry, kind)
+        kind = kind_of_file(path)
+        if kind not in EXAMINED and (kind is not None or path.suffix.lower() not in READ):
+            return Facts(kind=kind)
+        found = examine(path)
+        if found.calibration is not None:
+            return _of_calibration(found.calibration)
+        return Facts(kind=found.kind, summary=found.summary, warnings=found.warnings)
     except InvalidArgument as error:
-        return Facts(kind=kind, damaged=str(error).replace(f"{main_file(entry)}: ", "").replace(f"{entry}", entry.name))
-
-
-def _read(entry: Path, kind: str | None) -> Facts:
-    path = main_file(entry)
-    if kind is None and path.suffix.lower() in READ:
-        raise InvalidArgument(f"{path}: is not a file that stepdiag recognises")
-    if kind == "calibration":
-        return _of_calibration(read_calibration(path))
-    if kind == "measurement":
-        run = read_measurement(path)
-        lines = dict.fromkeys(run.line)
-        lost = int(np.count_nonzero(np.any([np.isnan(values) for values in run.channels.values()], axis=0)))
-        said = f"{len(run)} points on {', '.join(lines)}" + (f"; {lost} lack a reading" if lost else "")
-        return Facts(kind=kind, summary=said)
-    if kind == "scenario":
-        from stepdiag.display import lengths_text, lines_text
-        from stepdiag.scenario.description import read_scenario
-
-        scenario = read_scenario(path)
-        known = scenario.known
-        said = f"{lengths_text(known.plan.volume)}, {known.chain.name}, {lines_text(known.plan)}"
-        return Facts(kind=kind, summary=said, warnings=tuple(known.implausible))
-    if kind == "compensation.ini":
-        tables, _ = check_set(path)
-        return Facts(kind=kind, summary=f"{tables} tables")
-    return Facts(kind=kind)
+        return Facts(kind=kind, damaged=str(error).replace(f"{path}: ", "").replace(f"{path}", path.name))
 
 
 def _of_calibration(calibration: Calibration) -> Facts:

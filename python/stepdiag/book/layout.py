@@ -18,7 +18,6 @@ from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.io.comp_set import check_set
-from stepdiag.io.file_kind import kind_of_file
 from stepdiag.io.whole_files import make_folder, reason, sync_folder
 
 MARK: Final = "BOOK.txt"
@@ -98,12 +97,6 @@ def safe_name(name: str) -> str:
 def folder_of(kind: str | None) -> str:
     """The folder for a kind of file."""
     return next((folder for folder, kinds in FOLDERS.items() if kind in kinds), "documents")
-
-
-def kind_of_entry(path: Path) -> str | None:
-    """The kind of a file, or of a folder's main file. A TOML file in the book is a scenario."""
-    kind = kind_of_file(main_file(path))
-    return "scenario" if kind == "TOML file" else kind
 
 
 def main_file(entry: Path) -> Path:

@@ -81,7 +81,7 @@ def trends(calibrations: Sequence[Entry]) -> list[Trend]:
     """Of the largest error, squarenesses, slopes of positioning and temperatures; `calibrations`: the oldest first.
 
     Those that are rejected or unverified do not count. Quantities without a value in any are left out."""
-    sound = [one for one in calibrations if one.facts.calibration is not None and _counts(one.facts.calibration)]
+    sound = [one for one in calibrations if one.facts.calibration is not None and not one.facts.calibration.not_counted]
     if not sound:
         return []
     found = [_trend("largest error", "µm", sound)]
@@ -101,10 +101,6 @@ def due(largest: Trend | None, last: Entry | None, limit: float | None, interval
     if by_trend.day is not None and (by_interval is None or by_trend.day <= by_interval):
         return by_trend
     return by_trend if by_interval is None else Due(by_interval, "interval")
-
-
-def _counts(facts: CalibrationFacts) -> bool:
-    return facts.fit != "rejected" and not facts.unverified
 
 
 def _trend(name: str, unit: str, sound: Sequence[Entry]) -> Trend:
@@ -140,6 +136,8 @@ def _value(name: str, facts: CalibrationFacts) -> Value | None:
 
 def _unlike(facts: CalibrationFacts, latest: CalibrationFacts) -> str:
     """Why two calibrations are not to be compared."""
+    if facts.fit == "doubtful":  # its uncertainties are not to be relied on
+        return "the fit is doubtful"
     if facts.chain != latest.chain or facts.volume != latest.volume:
         return "another chain or volume"
     if facts.method != latest.method:

@@ -253,11 +253,7 @@ def find(words: tuple[str, ...], book: Path | None) -> None:
 @BOOK
 def remove(name: str, machine: str, book: Path | None) -> None:
     """Move the file NAME of a machine into the bin. `stepdiag book restore` moves it back."""
-    from stepdiag.book.book import find_book
-
-    found = find_book(book).machine(machine)
-    entry = found.entry(name)
-    _say_moved(found.remove(entry, command=("stepdiag", "book", "remove", "--machine", found.name, name)))
+    _move(name, machine, book, restored=False)
 
 
 @book.command(short_help="Move a file back.", epilog="\b\nExample: stepdiag book restore --machine M run.csv")
@@ -266,11 +262,16 @@ def remove(name: str, machine: str, book: Path | None) -> None:
 @BOOK
 def restore(name: str, machine: str, book: Path | None) -> None:
     """Move the file NAME of a machine back from the bin."""
+    _move(name, machine, book, restored=True)
+
+
+def _move(name: str, machine: str, book: Path | None, *, restored: bool) -> None:
     from stepdiag.book.book import find_book
 
     found = find_book(book).machine(machine)
-    entry = found.entry(name, removed=True)
-    _say_moved(found.restore(entry, command=("stepdiag", "book", "restore", "--machine", found.name, name)))
+    entry = found.entry(name, removed=restored)
+    verb, move = ("restore", found.restore) if restored else ("remove", found.remove)
+    say(f"moved to {move(entry, command=('stepdiag', 'book', verb, '--machine', found.name, name))}")
 
 
 @book.command(short_help="Make the index again.", epilog="\b\nExample: stepdiag book reindex")
@@ -284,10 +285,6 @@ def reindex(book: Path | None) -> None:
         count = found.reindex(progress)
     say(f"{count} files of {len(found.machines())} machines")
     _tell_index(found)
-
-
-def _say_moved(path: Path) -> None:
-    say(f"moved to {path}")
 
 
 def _tell_index(found: Any) -> None:

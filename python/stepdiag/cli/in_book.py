@@ -159,7 +159,7 @@ class _Use:
                 (
                     one
                     for one, count in wanted
-                    if entry.kind in (KINDS[one], "error map" if one in "ab" else None)
+                    if entry.kind in (KINDS[one], "error map" if one in ("a", "b") else None)
                     and (count == -1 or not given[one])
                 ),
                 None,

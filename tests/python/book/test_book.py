@@ -24,15 +24,6 @@ def run(*arguments: str) -> int:
     return main(list(arguments))
 
 
-@pytest.fixture
-def book(here: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a scenario, its run, and a book with one machine that has both."""
-    monkeypatch.setenv("STEPDIAG_BOOK", str(here / "book"))
-    assert run("book", "new", "VMC-1200", "--book", "book", "--serial-number", "0815", "--limit", "20") == 0
-    assert run("book", "add", "--machine", "VMC-1200", "scenario.toml", "run.csv") == 0
-    return here
-
-
 def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -338,3 +329,12 @@ def test_empty_book_says_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixtur
     Book.make(tmp_path / "book")
     assert run("book", "list", "--book", str(tmp_path / "book")) == 0
     assert "stepdiag book new" in capsys.readouterr().out
+
+
+def test_heads_and_studies_are_no_scenarios(book: Path) -> None:
+    from stepdiag.head.description import find_shipped_head
+
+    shutil.copyfile(find_shipped_head("beam_and_psd"), "head.toml")
+    assert run("book", "add", "--machine", "VMC-1200", "head.toml") == 0
+    assert (MACHINE / "documents/head.toml").exists()
+    assert run("simulate", "--machine", "VMC-1200") == 0

@@ -9,9 +9,9 @@ from typing import Final
 
 from starlette.responses import HTMLResponse
 
-from stepdiag.app.frame import address, banner, data_table, day, file_address, page
+from stepdiag.app.frame import address, banner, day, drop, file_address, page
 from stepdiag.book.book import Entry, MachineFolder
-from stepdiag.presentation.page.html import Markup, element, markup, section
+from stepdiag.presentation.page.html import Markup, element, markup, section, table
 
 # Format -> what it is, and the fields of the form that it uses beside those of all formats. A test compares them with
 # those of the command.
@@ -45,7 +45,7 @@ def compensate_screen(machine: MachineFolder, entry: Entry) -> HTMLResponse:
     return page(
         f"Compensate with {entry.name}",
         warning,
-        _present(machine, entry),
+        _present(machine),
         None if rejected else _form(machine, entry),
         _made(machine),
         _read_back(name),
@@ -58,18 +58,16 @@ def compensate_screen(machine: MachineFolder, entry: Entry) -> HTMLResponse:
     )
 
 
-def _present(machine: MachineFolder, entry: Entry) -> Markup:
-    field = element("input", type="file", id="present", multiple=True, data_target=address(machine.name, "files"))
+def _present(machine: MachineFolder) -> Markup:
     words = (
         "Copy the compensation table that the controller has now, and drop it here. The book keeps it, so that you can "
         "bring it back."
     )
-    label = element("label", "The controller's present table:", for_="present")
     return section(
         "present",
         "1. Keep what the controller has",
         element("p", words),
-        element("div", label, field, element("p", "", role="status", class_="quiet"), class_="drop"),
+        drop("present", "The controller's present table:", machine.name),
     )
 
 
@@ -139,21 +137,19 @@ def _made(machine: MachineFolder) -> Markup | None:
         )
     if not rows:
         return None
-    return section("made", "Tables", data_table("The latest first", ("Table", "Day", "From", "How to go back"), rows))
+    return section("made", "Tables", table("The latest first", ("Table", "Day", "From", "How to go back"), rows))
 
 
 def _read_back(name: str) -> Markup:
-    field = element("input", type="file", id="read-back", data_target=address(name, "files"), data_shows=True)
     words = (
         "After loading, copy the table from the controller and drop it here. “Already in the book as …” names the "
         "table that it equals, byte for byte; otherwise it differs from all of them."
     )
-    label = element("label", "The table read back:", for_="read-back")
     return section(
         "read-back-part",
         "3. Check what the controller took",
         element("p", words),
-        element("div", label, field, element("p", "", role="status", class_="quiet"), class_="drop"),
+        drop("read-back", "The table read back:", name, shows=True),
     )
 
 

@@ -9,8 +9,9 @@ from stepdiag.app.jobs import CommandJob
 from stepdiag.presentation.page.html import Markup, element
 
 
-def job_screen(job: CommandJob, machine: str, back: str) -> HTMLResponse:
+def job_screen(job: CommandJob) -> HTMLResponse:
     """While it runs the script asks for its state, and goes on to its result."""
+    machine, back = job.machine, address(job.machine) if job.machine else "/"
     running = job.status is None
     state: list[Markup | None] = []
     if running:

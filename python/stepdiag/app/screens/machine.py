@@ -7,8 +7,8 @@ from stepdiag.app.frame import (
     address,
     banner,
     curve,
-    data_table,
     day,
+    drop,
     file_address,
     largest_error,
     number,
@@ -21,7 +21,7 @@ from stepdiag.book.facts import Value
 from stepdiag.book.layout import FOLDERS
 from stepdiag.book.overview import Overview, overview
 from stepdiag.parameters import SQUARENESSES
-from stepdiag.presentation.page.html import Markup, definitions, element, markup, section
+from stepdiag.presentation.page.html import Markup, definitions, element, markup, section, table
 
 
 def machine_screen(machine: MachineFolder) -> HTMLResponse:
@@ -46,8 +46,12 @@ def machine_screen(machine: MachineFolder) -> HTMLResponse:
 def _now(row: Overview) -> Markup:
     facts = row.last.facts.calibration if row.last else None
     if row.last is None or facts is None:
-        return element("p", "No calibration yet. Import a run, then evaluate it.")
-    said = element("p", "Largest error ", largest_error(facts), " on ", day(row.last.date), ".")
+        words = f"No calibration that counts: {row.caution}." if row.caution else "No calibration yet."
+        return element("p", words, " Import a run, then evaluate it.")
+    said = markup(
+        element("p", "Largest error ", largest_error(facts), " on ", day(row.last.date), "."),
+        element("p", f"Do not rely on this: {row.caution}.") if row.caution else None,
+    )
     if row.about.limit_um is None:
         words = element("p", "No limit is stated for this machine.")
         return element("section", said, words, class_="banner", aria_label="Verdict")
@@ -59,7 +63,7 @@ def _now(row: Overview) -> Markup:
         "not within": markup("The machine is not within ", limit),
         "undecided": markup("Undecided whether the machine is within ", limit),
     }[row.verdict]
-    return banner(row.verdict, headline, said)
+    return banner("undecided" if row.caution else row.verdict, headline, said)
 
 
 def _about(row: Overview) -> Markup | None:
@@ -80,18 +84,8 @@ def _about(row: Overview) -> Markup | None:
 
 
 def _import(name: str) -> Markup:
-    field = element("input", type="file", id="files", name="files", multiple=True, data_target=address(name, "files"))
-    return section(
-        "import",
-        "Import files",
-        element(
-            "div",
-            element("label", "Drop runs, scenarios, calibrations or documents here, or choose them:", for_="files"),
-            field,
-            element("p", "", role="status", class_="quiet"),
-            class_="drop",
-        ),
-    )
+    words = "Drop runs, scenarios, calibrations or documents here, or choose them:"
+    return section("import", "Import files", drop("files", words, name))
 
 
 def _calibrations(row: Overview, entries: list[Entry]) -> Markup | None:
@@ -120,7 +114,7 @@ def _calibrations(row: Overview, entries: list[Entry]) -> Markup | None:
     heading = ("File", "Day", "Fit", "Largest error", "Machine", *(f"{n}, µrad" for n in SQUARENESSES), "")
     small = curve(errors[-20:], row.about.limit_um)
     link = element("p", element("a", "Trend", href=address(row.name, "trend"), class_="button"))
-    return section("calibrations", "Calibrations", small, link, data_table("The latest first", heading, cells))
+    return section("calibrations", "Calibrations", small, link, table("The latest first", heading, cells))
 
 
 def _runs(name: str, entries: list[Entry]) -> Markup | None:
@@ -138,9 +132,7 @@ def _runs(name: str, entries: list[Entry]) -> Markup | None:
         for one in reversed(kept)
     ]
     return (
-        section("runs", "Runs", data_table("The latest first", ("File", "Day", "Content", "", ""), cells))
-        if cells
-        else None
+        section("runs", "Runs", table("The latest first", ("File", "Day", "Content", "", ""), cells)) if cells else None
     )
 
 
@@ -163,7 +155,7 @@ def _others(entries: list[Entry]) -> Markup | None:
         section(
             "others",
             "Other files",
-            data_table("Scenarios, plans, reports, exports, documents", ("File", "Day", "Content", ""), cells),
+            table("Scenarios, plans, reports, exports, documents", ("File", "Day", "Content", ""), cells),
         )
         if cells
         else None
@@ -178,8 +170,8 @@ def _bin(name: str, entries: list[Entry]) -> Markup | None:
     ]
     if not cells:
         return None
-    table = data_table("Removed files", ("File", "Folder", "Day", ""), cells)
-    return element("details", element("summary", f"Bin ({len(cells)})"), table)
+    removed = table("Removed files", ("File", "Folder", "Day", ""), cells)
+    return element("details", element("summary", f"Bin ({len(cells)})"), removed)
 
 
 def _value(value: Value | None) -> Markup:

@@ -6,10 +6,10 @@ from typing import Final
 
 from starlette.responses import HTMLResponse
 
-from stepdiag.app.frame import address, curve, data_table, day, file_address, largest_error, page, verdict
+from stepdiag.app.frame import address, curve, day, file_address, largest_error, page, verdict
 from stepdiag.book.book import Book, Entry, MachineFolder
 from stepdiag.book.overview import Overview, overview
-from stepdiag.presentation.page.html import Markup, element, markup
+from stepdiag.presentation.page.html import Markup, element, markup, table
 
 _OF_CURVE: Final = 8  # calibrations
 
@@ -29,10 +29,10 @@ def search_screen(book: Book, words: str) -> HTMLResponse:
         else (_link(one), one.kind or "file", one.machine, day(one.date))
         for one in found[:200]
     ]
-    table = data_table(f"{len(found)} found", ("Name", "Kind", "Machine", "Day"), rows)
+    listed = table(f"{len(found)} found", ("Name", "Kind", "Machine", "Day"), rows)
     return page(
         "Search",
-        table if rows else element("p", "Nothing in the book has these words."),
+        listed if rows else element("p", "Nothing in the book has these words."),
         command=("book", "find", *words.split()),
         search=words,
     )
@@ -49,7 +49,7 @@ def _card(machine: MachineFolder, row: Overview) -> Markup:
     about = ", ".join(filter(None, (row.about.title, row.about.serial_number, row.about.customer)))
     said: list[object] = []
     if facts is None or row.last is None:
-        said.append(element("p", "Not calibrated yet."))
+        said.append(element("p", "No calibration that counts." if row.caution else "Not calibrated yet."))
     else:
         x, y, z = facts.volume
         said += [
@@ -57,6 +57,8 @@ def _card(machine: MachineFolder, row: Overview) -> Markup:
             element("p", "Largest error ", largest_error(facts), " on ", day(row.last.date)),
             element("p", f"{x:g} × {y:g} × {z:g} mm", class_="quiet"),
         ]
+    if row.caution:
+        said.append(element("p", f"Do not rely on this: {row.caution}."))
     if row.due.day is not None:
         overdue = row.due.day < date.today()
         words = "Overdue since " if overdue else "Due "
@@ -74,8 +76,10 @@ def _verdict(row: Overview) -> Markup:
     """Of the machine beside its limit, or else of the last fit."""
     limit, facts = row.about.limit_um, row.last.facts.calibration if row.last else None
     if limit is None:
-        return verdict(facts.fit if facts else None, "Fit ")
-    return markup(verdict(row.verdict), " of its limit of " if row.verdict is None else " ", f"{limit:g} µm")
+        return verdict(facts.fit if facts else None, "Fit ", row.caution)
+    return markup(
+        verdict(row.verdict, caution=row.caution), " of its limit of " if row.verdict is None else " ", f"{limit:g} µm"
+    )
 
 
 def _last_errors(machine: MachineFolder) -> Sequence[tuple[float, tuple[float, float] | None]]:
@@ -84,6 +88,6 @@ def _last_errors(machine: MachineFolder) -> Sequence[tuple[float, tuple[float, f
     return [(one.value, one.interval) for one in found if one is not None]
 
 
-def damaged(title: str, why: str, status: int) -> HTMLResponse:
+def refusal_screen(title: str, why: str, status: int) -> HTMLResponse:
     """In place of a screen."""
     return page(title, element("p", why), status=status)

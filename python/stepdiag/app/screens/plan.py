@@ -4,9 +4,9 @@ from typing import Final
 
 from starlette.responses import HTMLResponse
 
-from stepdiag.app.frame import address, data_table, day, file_address, page
+from stepdiag.app.frame import address, day, file_address, page
 from stepdiag.book.book import Entry, MachineFolder
-from stepdiag.presentation.page.html import Markup, element, section
+from stepdiag.presentation.page.html import Markup, element, section, table
 
 DIALECTS: Final = ("linuxcnc", "iso")
 
@@ -107,4 +107,4 @@ def _made(machine: MachineFolder) -> Markup | None:
         if last
         else None
     )
-    return section("made", "Plans and programs", picture, data_table("The latest first", ("File", "Day", "Kind"), rows))
+    return section("made", "Plans and programs", picture, table("The latest first", ("File", "Day", "Kind"), rows))

@@ -2,12 +2,12 @@
 
 from starlette.responses import HTMLResponse
 
-from stepdiag.app.frame import address, data_table, day, number, page, trend_figure
+from stepdiag.app.frame import address, day, number, page, trend_figure
 from stepdiag.book.blocks import due_text
 from stepdiag.book.book import MachineFolder
 from stepdiag.book.overview import overview
 from stepdiag.book.trend import Trend, trends
-from stepdiag.presentation.page.html import Markup, element, markup, section, sentence
+from stepdiag.presentation.page.html import Markup, element, markup, section, sentence, table
 
 _TITLES = {
     "largest error": "Largest error in the volume",
@@ -52,10 +52,8 @@ def _of_quantity(trend: Trend, limit: float | None) -> Markup:
         )
         for one in reversed(trend.points)
     ]
-    table = data_table(
-        f"{trend.unit}, with expanded uncertainties (k = 2)", ("Day", "Value", "File", "Change", ""), rows
-    )
-    values = element("details", element("summary", "Values"), table)
+    found = table(f"{trend.unit}, with expanded uncertainties (k = 2)", ("Day", "Value", "File", "Change", ""), rows)
+    values = element("details", element("summary", "Values"), found)
     name = trend.name.replace(" ", "-")
     return section(
         name, _TITLES[trend.name], trend_figure(trend, limit), element("p", _drift(trend), class_="quiet"), values
