@@ -77,9 +77,7 @@ def _verdict(row: Overview) -> Markup:
     limit, facts = row.about.limit_um, row.last.facts.calibration if row.last else None
     if limit is None:
         return verdict(facts.fit if facts else None, "Fit ", row.caution)
-    return markup(
-        verdict(row.verdict, caution=row.caution), " of its limit of " if row.verdict is None else " ", f"{limit:g} µm"
-    )
+    return markup(f"Limit {limit:g} µm: ", verdict(row.verdict, caution=row.caution))
 
 
 def _last_errors(machine: MachineFolder) -> Sequence[tuple[float, tuple[float, float] | None]]:
