@@ -149,6 +149,30 @@ def test_path_of_a_person(person: Person, files: Path, tmp_path: Path) -> None:
     assert person.foreign == []
 
 
+def test_dry_run_says_every_move(person: Person, running: Running) -> None:
+    page = person.page
+    page.goto(running.address.split("/enter")[0] + "/machines/VMC%201200/plan?scenario=scenarios/scenario.toml")
+    said = page.locator("#dry-run-said")
+    page.get_by_role("button", name="Play").click()
+    expect(said).to_contain_text("point 3 of", timeout=5_000)
+    page.get_by_role("button", name="Pause").click()
+    slider = page.get_by_role("slider", name="Point")
+    slider.focus()
+    slider.press("Home")
+    assert "Set-up 1, line ppp, point 1 of 31: head and mirror are placed, the axes stand at 0,0 / 0,0 / 0,0 mm" in (
+        said.inner_text()
+    )
+    mirror = page.locator("svg.machine polygon.mirror")
+    places = [mirror.get_attribute("points")]
+    for move in ("X to 80,0 mm", "Y to 60,0 mm", "Z to 50,0 mm"):
+        slider.press("ArrowRight")
+        assert said.inner_text().endswith(f": {move}")
+        places.append(mirror.get_attribute("points"))
+    assert len(set(places)) == 4
+    slider.press("End")
+    assert "line 00p" in said.inner_text()
+
+
 SCREENS = {
     "machines": "/",
     "new": "/new",

@@ -95,7 +95,7 @@ class App:
         return new_machine_screen()
 
     def show_plan(self, request: Request) -> Response:
-        return plan_screen(self.machine(request))
+        return plan_screen(self.machine(request), request.query_params.get("scenario", ""))
 
     def picture(self, request: Request) -> Response:
         """A PNG picture of the book, to look at."""
@@ -192,14 +192,19 @@ class App:
     async def plan(self, request: Request) -> Response:
         """A search for plans, what the scenario's plan determines, or its program."""
         machine, given = await asyncio.to_thread(self.machine, request), await _form(request)
-        what, of_machine = given.get("what", ""), self._of(machine)
+        what = given.get("what", "")
+        of_scenario = [*self._of(machine), self.entry(machine, given.get("scenario", "")).file]
         if what == "observe":
-            return self._begin("What the plan determines", [["observe", *of_machine]], machine.name, "")
+            return self._begin("What the plan determines", [["observe", *of_scenario]], machine.name, "")
         if what == "nc":
-            words = ["nc", *of_machine, *_options(given, ("dialect",))]
+            words = ["nc", *of_scenario, *_options(given, ("dialect",))]
             return self._begin("Measuring program", [words], machine.name, "")
         name = await asyncio.to_thread(_free, machine, "plans", "plans", ".png")
-        words = ["plan", *of_machine, *_options(given, ("minutes",)), "-o", name]
+        words = ["plan", *of_scenario, "-o", name]
+        decides = given.get("goal") == "decide" and machine.about.limit_um is not None
+        words += [f"--decide={machine.about.limit_um!r}"] if decides else _options(given, ("minutes",))
+        if given.get("write"):
+            words += ["--write", await asyncio.to_thread(_free, machine, "scenarios", Path(name).stem, ".toml")]
         return self._begin("Plans", [words], machine.name, "")
 
     async def evaluate(self, request: Request) -> Response:

@@ -10,7 +10,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.options import PATH, Writes, tell_inputs, tell_trust
 from stepdiag.cli.terminal import say
-from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
+from stepdiag.io.outputs import FIGURE, PLANS, SCENARIO, OutputFile
 from stepdiag.progress import Progress
 from stepdiag.units import MICROMETRE
 
@@ -38,7 +38,7 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
 
 @click.command(
     cls=OfMachine,
-    makes={"output": Kept("plans")},
+    makes={"output": Kept("plans"), "written": Kept("scenarios")},
     epilog="\b\nExample: stepdiag plan scenario.toml --minutes 30 -o plan.png",
 )
 @click.argument("scenario", type=PATH)
@@ -97,6 +97,13 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     help="Also draw the curve (.png, .svg, .pdf) or write all plans (.csv).",
 )
 @click.option(
+    "--write",
+    "written",
+    type=Writes(SCENARIO),
+    metavar="FILE",
+    help="Also write the scenario with the advised plan (.toml). Its comments are kept.",
+)
+@click.option(
     "--recheck",
     "baseline",
     type=PATH,
@@ -120,6 +127,7 @@ def plan(
     decide: float | None,
     measured: Path | None,
     output: OutputFile | None,
+    written: OutputFile | None,
     baseline: Path | None,
     limit: float | None,
 ) -> None:
@@ -144,14 +152,21 @@ def plan(
     if limit is not None and baseline is None:
         raise InvalidArgument("--limit: expected --recheck as well")
     if baseline is not None:
-        of_new_plans = {"--volume-u": volume_u, "--squareness-u": squareness_u, "--decide": decide, "--from": measured}
+        of_new_plans = {
+            "--volume-u": volume_u,
+            "--squareness-u": squareness_u,
+            "--decide": decide,
+            "--from": measured,
+            "--write": written,
+        }
         for name, value in of_new_plans.items():
             if value is not None:
                 raise InvalidArgument(f"{name}: not together with --recheck")
         _plan_recheck(scenario, baseline, minutes, limit, output)
         return
     from stepdiag.io.whole_files import check_input, write_whole
-    from stepdiag.planning.plan_by_time import aim_of, deciding_goal, squareness_goal, volume_goal
+    from stepdiag.planning.plan_by_time import aim_of, deciding_goal, own_candidate, squareness_goal, volume_goal
+    from stepdiag.planning.scenario_with_plan import scenario_with_plan
     from stepdiag.presentation.plan_by_time import plan_csv
     from stepdiag.scenario.description import read_scenario
 
@@ -163,6 +178,9 @@ def plan(
         inputs.append(measured)
     tell_inputs(described)
     path = None if output is None else output.claim(*inputs, error_map=described.truth.error_map)
+    new = None if written is None else written.claim(*inputs, error_map=described.truth.error_map)
+    if new is not None:
+        scenario_with_plan(known, own_candidate(known), new)  # refused before the search, not after it
     goals = [
         *([volume_goal(volume_u)] if volume_u is not None else []),
         *([squareness_goal(squareness_u)] if squareness_u is not None else []),
@@ -172,6 +190,10 @@ def plan(
     aim = aim_of(known, minutes=minutes, spacing=spacing, family=family, goals=goals)
     found = _searched(described, aim, times)
     taken = _say_choice(described, aim, found)
+    if new is not None and taken is None:
+        raise InvalidArgument(f"{new}: not written, for no plan is advised")
+    if new is not None and taken is not None:
+        write_whole(new, scenario_with_plan(known, taken.candidate, new))
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":
         write_whole(path, plan_csv(found, family))

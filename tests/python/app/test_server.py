@@ -221,7 +221,7 @@ def test_path_from_a_new_machine_to_the_report(person: TestClient, book: Path) -
     made = sd.read_scenario("book/machines/Fräse 3/scenarios/scenario.toml").known
     assert (made.chain.name, list(made.plan.volume)) == ("[w X' Y' b Z t]", [400.0, 300.0, 250.5])
     machine = str(state["next"])
-    answer = person.post(f"{machine}/plans", data={"what": "nc", "dialect": "iso"})
+    answer = person.post(f"{machine}/plans", data={"what": "nc", "scenario": "scenarios/scenario.toml", "dialect": "iso"})
     assert ended(person, answer)["status"] == 0
     assert "plans/" in person.get(answer.headers["location"]).text
     for name in ("scenario.toml", "run.csv"):
@@ -344,6 +344,26 @@ def test_pictures_alone_are_shown_in_place(person: TestClient) -> None:
     assert (shown.status_code, shown.headers["content-type"]) == (200, "image/png")
     for file in ("plans/evil.svg", "runs/run.csv", "../../BOOK.txt"):
         assert person.get(f"/machines/VMC-1200/picture/{file}").status_code == 404
+
+
+def test_searched_plan_becomes_that_of_the_next_run(person: TestClient) -> None:
+    """The page shows the latest scenario's plan; the search writes another one beside it."""
+    few = 'steps = [5]\nrepeats = [1]\nline_sets = [["ppp", "npp", "p00"]]'
+    Path("few.toml").write_text(f"{Path('scenario.toml').read_text()}[plan_by_time]\n{few}\n")
+    assert run("book", "add", "--machine", "VMC-1200", "few.toml") == 0
+    first = person.get("/machines/VMC-1200/plan").text
+    assert '<option value="scenarios/few.toml" selected>' in first
+    assert "front left low" in first
+    given = {"what": "plan", "scenario": "scenarios/few.toml", "goal": "time", "minutes": "40", "write": "yes"}
+    assert ended(person, person.post("/machines/VMC-1200/plans", data=given))["status"] == 0
+    written = [path.name for path in (MACHINE / "scenarios").iterdir()]
+    assert sorted(written) == ["few.toml", "plans.toml", "scenario.toml"]
+    plan = sd.read_scenario(MACHINE / "scenarios/plans.toml").known.plan
+    shown = person.get("/machines/VMC-1200/plan").text
+    assert '<option value="scenarios/plans.toml" selected>' in shown
+    assert f"{plan.steps} per axis" in shown
+    other = person.get("/machines/VMC-1200/plan?scenario=scenarios/few.toml").text
+    assert '<option value="scenarios/few.toml" selected>' in other
 
 
 def judged(name: str, fit: str, date: str) -> None:

@@ -2,15 +2,17 @@
 
 import csv
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from places import ROOT
+from places import ROOT, SHIPPED_HEADS
 from small_scenario import SCENARIO
 
 import stepdiag as sd
+from stepdiag._core import InvalidArgument
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.cli import main
 from stepdiag.figures.plan_by_time import draw_plans
@@ -30,6 +32,7 @@ from stepdiag.planning.plan_by_time import (
     settings,
     stated_candidates,
 )
+from stepdiag.planning.scenario_with_plan import scenario_with_plan
 from stepdiag.presentation.plan_by_time import (
     advice,
     fault_advice,
@@ -40,6 +43,7 @@ from stepdiag.presentation.plan_by_time import (
     shown,
 )
 from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.known import Known
 
 FEW = """
 [plan_by_time]
@@ -393,3 +397,54 @@ def test_plan_is_the_best_of_the_stated_ones_in_the_time_or_the_shortest_for_a_g
     reached = [one for one in outcomes if one.volume <= 2.0 * taken.volume and one.spacing <= 16.0 * (1.0 + 1e-9)]
     assert goal.taken.minutes == min(one.minutes for one in reached)
     assert sd.plan(scenario, minutes=0.1).taken is None
+
+
+# --- the scenario with the advised plan ------------------------------------------------------------------------------
+def test_advised_plan_is_written_into_a_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given, written = tmp_path / "scenario.toml", tmp_path / "other.toml"
+    given.write_text(SCENARIO + FEW + SETS)
+    assert main(["plan", str(given), "--minutes", "20", "--write", str(written)]) == 0
+    advised = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("take: "))
+    new = sd.read_scenario(written).known
+    assert f"take: {own_candidate(new).description}, {new.plan.steps} steps" in advised
+    assert main(["plan", str(given), "--minutes", "20", "--write", str(written)]) == 2
+    assert "exists already, perhaps written by hand: name another file" in capsys.readouterr().err
+
+
+def test_another_plan_leaves_the_rest_of_the_text(tmp_path: Path) -> None:
+    """Comments too; but what is said of a line that is not measured any more goes."""
+    given = tmp_path / "scenario.toml"
+    of_lines = "# aligned again\n[misalignment.npp]\nroll_urad = 5.0\n[misalignment.pnp]\nroll_urad = 4.0\n"
+    given.write_text(SCENARIO.replace("steps = 5", "steps = 5 # of 16 mm\nblock = 5") + of_lines)
+    known = sd.read_scenario(given).known
+    candidate = Candidate(("ppp", "npp", "pp0"), (), 3, 2, scale_points="ends")
+    text = scenario_with_plan(known, candidate, tmp_path / "other.toml")
+    assert own_candidate(parse_scenario(text).known) == candidate
+    changed = {one for one in text.splitlines() if one not in given.read_text().splitlines()}
+    assert changed == {
+        'lines = ["ppp", "npp", "pp0"]',
+        "steps = 3 # of 16 mm",
+        "block = 3",
+        "scale_lines = []",
+        "repeats = 2",
+    }
+    gone = [one for one in given.read_text().splitlines() if one not in text.splitlines()]
+    assert "[misalignment.pnp]" in gone
+    assert len(gone) == 6
+    with pytest.raises(InvalidArgument, match=r"elsewhere.scenario\.toml: head.description"):
+        scenario_with_plan(_described(given), candidate, tmp_path / "elsewhere" / "scenario.toml")
+
+
+def _described(scenario: Path) -> Known:
+    """The same with a description of its head beside it."""
+    shutil.copy(SHIPPED_HEADS / "three_beams.toml", scenario.parent / "own.toml")
+    scenario.write_text(SCENARIO.replace('layout = "ideal"', 'description = "./own.toml"'))
+    return sd.read_scenario(scenario).known
+
+
+def test_no_plan_no_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given, written = tmp_path / "scenario.toml", tmp_path / "other.toml"
+    given.write_text(SCENARIO + FEW + SETS)
+    assert main(["plan", str(given), "--minutes", "1", "--write", str(written)]) == 2
+    assert "other.toml: not written, for no plan is advised" in capsys.readouterr().err
+    assert not written.exists()

@@ -127,7 +127,97 @@ function waitForFrames() {
   }
 }
 
+/**
+ * @typedef {{name: string, setUp: number, head: number[], frame: number[][], points: number[][]}} PlannedLine
+ * @typedef {{projection: number[], mirror: number[], lines: PlannedLine[]}} DryRun
+ */
+
+/** The moves of a plan, slowly: mirror and beam go from point to point, over the picture of its lines. */
+function dryRun() {
+  const picture = /** @type {SVGSVGElement | null} */ (document.querySelector("svg[data-dry-run]"));
+  const place = document.getElementById("dry-run");
+  const slider = /** @type {HTMLInputElement | null} */ (document.getElementById("dry-run-at"));
+  const play = document.getElementById("dry-run-play");
+  const said = document.getElementById("dry-run-said");
+  if (!picture || !place || !slider || !play || !said) return;
+  /** @type {DryRun} */
+  const run = JSON.parse(picture.dataset.dryRun ?? "");
+  const moves = run.lines.flatMap((line) => line.points.map((_, at) => ({ line, at })));
+  const group = document.createElementNS("http://www.w3.org/2000/svg", "g");
+  const [way, beam, mirror, head] = ["polyline", "polyline", "polygon", "circle"].map((name) =>
+    group.appendChild(document.createElementNS("http://www.w3.org/2000/svg", name)),
+  );
+  way.setAttribute("class", "way");
+  beam.setAttribute("class", "beam");
+  mirror.setAttribute("class", "mirror");
+  head.setAttribute("class", "head");
+  head.setAttribute("r", "6");
+  picture.append(group);
+  slider.max = `${moves.length - 1}`;
+  place.hidden = false;
+
+  /** @param {number[]} p a point in mm @returns {number[]} in the picture */
+  const flat = ([x, y, z]) => {
+    const m = run.projection;
+    return [m[0] * x + m[1] * y + m[2] * z + m[6], m[3] * x + m[4] * y + m[5] * z + m[7]];
+  };
+  /** @param {number[][]} points */
+  const path = (points) => points.map((p) => flat(p).map((v) => v.toFixed(1)).join(",")).join(" ");
+
+  const show = () => {
+    const number = Number(slider.value);
+    const { line, at } = moves[number];
+    const point = line.points[at];
+    const [[right, up], [width, height]] = [line.frame, run.mirror];
+    const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) =>
+      point.map((value, k) => value + (a * width * right[k] + b * height * up[k]) / 2),
+    );
+    way.setAttribute("points", path(line.points.slice(0, at + 1)));
+    beam.setAttribute("points", path([line.head, point]));
+    mirror.setAttribute("points", path(corners));
+    const [x, y] = flat(line.head);
+    head.setAttribute("cx", x.toFixed(1));
+    head.setAttribute("cy", y.toFixed(1));
+    picture.classList.add("moving");
+    const before = line.points[at - 1];
+    const moved = [0, 1, 2].filter((k) => before && before[k] !== point[k]);
+    const what = moved.map((k) => `${"XYZ"[k]} to ${localNumber(point[k].toFixed(1))} mm`).join(", ");
+    const first = `head and mirror are placed, the axes stand at ${point.map((v) => localNumber(v.toFixed(1))).join(" / ")} mm`;
+    said.textContent = `Set-up ${line.setUp}, line ${line.name}, point ${at + 1} of ${line.points.length}: ${what || first}`;
+  };
+  /** @type {number | undefined} */
+  let timer;
+  const stop = () => {
+    clearInterval(timer);
+    timer = undefined;
+    play.textContent = "Play";
+  };
+  slider.addEventListener("input", () => {
+    stop();
+    show();
+  });
+  play.addEventListener("click", () => {
+    if (timer !== undefined) {
+      stop();
+      return;
+    }
+    play.textContent = "Pause";
+    if (Number(slider.value) >= moves.length - 1) slider.value = "0";
+    show();
+    timer = window.setInterval(() => {
+      const next = Number(slider.value) + 1;
+      if (next >= moves.length) {
+        stop();
+        return;
+      }
+      slider.value = `${next}`;
+      show();
+    }, 350);
+  });
+}
+
 localise();
+dryRun();
 limitSlider();
 dropping();
 waitForFrames();
