@@ -221,7 +221,9 @@ def test_path_from_a_new_machine_to_the_report(person: TestClient, book: Path) -
     made = sd.read_scenario("book/machines/Fräse 3/scenarios/scenario.toml").known
     assert (made.chain.name, list(made.plan.volume)) == ("[w X' Y' b Z t]", [400.0, 300.0, 250.5])
     machine = str(state["next"])
-    answer = person.post(f"{machine}/plans", data={"what": "nc", "scenario": "scenarios/scenario.toml", "dialect": "iso"})
+    answer = person.post(
+        f"{machine}/plans", data={"what": "nc", "scenario": "scenarios/scenario.toml", "dialect": "iso"}
+    )
     assert ended(person, answer)["status"] == 0
     assert "plans/" in person.get(answer.headers["location"]).text
     for name in ("scenario.toml", "run.csv"):
