@@ -38,6 +38,7 @@ COLOUR: Final[Mapping[str, str]] = {
     "backward": _TEAL,
     "outlier": _VERMILLION,
     "slip": _BLACK,
+    "significant": _BLACK,
     "limit": "#666666",
 }
 # Groups without a meaning of their own, such as parts of a budget. They become lighter in this order.
@@ -50,6 +51,7 @@ USED_TOGETHER: Final[Mapping[str, tuple[str, ...]]] = {
     "methods": ("truth", "adjustment", "enhanced", "conventional"),
     "verdicts": ("accepted", "doubtful", "rejected", "unchecked"),
     "change": ("before", "after", "outlier"),
+    "comparison": ("X", "Y", "Z", "significant"),
     "readings": ("forward", "backward", "outlier", "slip"),
 }
 

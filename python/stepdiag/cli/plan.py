@@ -200,7 +200,8 @@ def plan(
     elif path is not None:
         from stepdiag.figures.plan_by_time import draw_plans
 
-        write_whole(path, draw_plans(found, taken, aim.minutes, suffix))
+        own = next((one for one in found if one.candidate == own_candidate(known)), None)
+        write_whole(path, draw_plans(found, taken, aim.minutes, suffix, family=family, own=own))
 
 
 def _times_of(measured: Path, known: "Known") -> "PlanByTimeSection":

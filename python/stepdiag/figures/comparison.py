@@ -24,7 +24,13 @@ from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.style import BAND, COLOUR, own_style
 
 LIMIT: Any = {"color": COLOUR["limit"], "linewidth": 0.8, "linestyle": (0, (4, 2))}
-MARK: Any = {"linestyle": "none", "marker": "X", "markersize": 5.0, "color": COLOUR["outlier"], "markeredgewidth": 0.0}
+MARK: Any = {
+    "linestyle": "none",
+    "marker": "X",
+    "markersize": 5.0,
+    "color": COLOUR["significant"],
+    "markeredgewidth": 0.0,
+}
 REVERSAL: Any = {"linestyle": (0, (1, 1)), "linewidth": 1.0, "marker": ""}
 
 

@@ -1,14 +1,11 @@
-"""Figure of `stepdiag plan`: largest uncertainty of the fastest plans over measuring time."""
+"""Figure of `stepdiag plan`: what the best plans reach in which time, and which one is advised."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import cycle
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from stepdiag.parameters import REPORT_UNIT, Kind, in_report_units
@@ -17,89 +14,117 @@ from stepdiag.style import own_style, save, series
 
 GREY: Final = "#555555"
 TITLES: Final[dict[Family, str]] = {
-    "volume": "functional point in the volume",
-    "length": "positioning and straightness",
-    "angle": "angles",
-    "squareness": "squarenesses",
+    "volume": "of the functional point in the volume",
+    "length": "of positioning and straightness",
+    "angle": "of angles",
+    "squareness": "of squarenesses",
 }
+NAME: Final = 0.04  # of the picture's height that a name takes
+FAR: Final = 3.0  # times the available time: how far the picture goes on
 
 
-def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, suffix: str) -> bytes:
-    """Draw the plans: content of a "png", "svg" or "pdf" file, same bytes for same plans.
+def draw_plans(
+    found: Sequence[Outcome],
+    taken: Outcome | None,
+    minutes: float,
+    suffix: str,
+    *,
+    family: Family = "volume",
+    own: Outcome | None = None,
+) -> bytes:
+    """Draw the uncertainty of a family (faults: of the volume) over measuring time, a staircase for each number of
+    steps: content of a "png", "svg" or "pdf" file, same bytes for same plans.
 
-    `taken` is the plan to mark."""
-    plans = [o for o in complete(found) if all(math.isfinite(o.worst(family)) for family in TITLES)]
+    `taken` is the plan to take, `own` that of the scenario; `minutes`: the available time, infinite: any."""
+    shown: Family = "volume" if family == "faults" else family
+    plans = [one for one in complete(found) if math.isfinite(one.worst(shown))]
     with own_style():
-        figure = Figure(figsize=(14.0, 4.6), layout="constrained")
-        shapes = _shapes(plans)
-        panels: Any = figure.subplots(1, len(TITLES), sharex=True)
-        for axes, family in zip(panels, TITLES, strict=True):
-            _draw_family(axes, plans, family, minutes, shapes)
-            if taken is not None:
-                axes.plot(
-                    taken.minutes, _value(taken, family), "o", markersize=12, fillstyle="none", color="black", zorder=3
-                )
-        handles, labels = panels[0].get_legend_handles_labels()
-        if handles:
-            title = "steps (farthest nodes); ring: the plan to take"
-            figure.legend(handles, labels, loc="outside upper center", ncols=len(handles), title=title)
-            figure.legend(handles=list(_marks(plans, shapes)), loc="outside lower center", ncols=6, fontsize=7.5)
+        figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+        axes = figure.subplots()
+        axes.set_title(f"Largest standard uncertainty {TITLES[shown]}", loc="left")
+        axes.set_xlabel("minutes at the machine")
+        axes.set_ylabel(REPORT_UNIT[_kind(shown)])
+        if plans:
+            _limits(axes, plans, shown, taken, minutes)
+            _staircases(axes, plans, shown)
+        if math.isfinite(minutes):
+            axes.axvspan(minutes, axes.get_xlim()[1], color=GREY, alpha=0.08, linewidth=0.0)
+            axes.text(
+                minutes,
+                0.99,
+                " more than the available time",
+                color=GREY,
+                va="top",
+                transform=axes.get_xaxis_transform(),
+            )
+        if own is not None and own in plans:
+            _mark(axes, own, shown, "D", "the scenario's own plan" + (", the one to take" if own is taken else ""))
+        if taken is not None and taken is not own:
+            _mark(axes, taken, shown, "o", f"take: {_said(taken)}")
         return save(figure, suffix)
 
 
-def _lines(plan: Outcome) -> str:
-    """Which kinds of lines a plan has beside its scale lines."""
-    counts = plan.candidate.counts
-    return " and ".join(f"{name}s" for name, count in counts.items() if count and name != "scale line")
-
-
-def _shapes(plans: Sequence[Outcome]) -> dict[str, str]:
-    """A marker for each set of lines."""
-    return dict(zip(sorted({_lines(plan) for plan in plans}), cycle("osD^vPX*"), strict=False))
-
-
-def _style(scale_lines: int, repeats: int, colour: str) -> dict[str, Any]:
-    """Hollow without scale lines, pale with one or two, full with three; larger with more repeats."""
-    face = {0: "white", 3: colour}.get(scale_lines, to_rgba(colour, 0.35))
-    return {"markerfacecolor": face, "markeredgecolor": colour, "markersize": 2.6 + 1.1 * math.log2(repeats)}
-
-
-def _marks(plans: Sequence[Outcome], shapes: Mapping[str, str]) -> Iterator[Line2D]:
-    for name, marker in shapes.items():
-        yield Line2D([], [], linestyle="none", marker=marker, label=name, **_style(3, 2, GREY))
-    for count in sorted({len(plan.candidate.scale_lines) for plan in plans}):
-        label = f"{count or 'no'} scale line{'' if count == 1 else 's'}"
-        yield Line2D([], [], linestyle="none", marker="o", label=label, **_style(count, 4, GREY))
-    for repeats in sorted({plan.candidate.repeats for plan in plans}):
-        label = "measured once" if repeats == 1 else f"{repeats} times"
-        yield Line2D([], [], linestyle="none", marker="o", label=label, **_style(3, repeats, GREY))
-
-
-def _draw_family(
-    axes: Axes, plans: Sequence[Outcome], family: Family, minutes: float, shapes: Mapping[str, str]
-) -> None:
-    """For each number of steps, a staircase: the best plan until the next one is affordable."""
-    for index, steps in enumerate(sorted({o.candidate.steps for o in plans})):
-        colour, style = series(index)
-        own = sorted((o for o in plans if o.candidate.steps == steps), key=lambda o: o.seconds)
-        x, y = [o.minutes for o in own], [_value(o, family) for o in own]
-        for one, at, u in zip(own, x, y, strict=True):
-            style_of = _style(len(one.candidate.scale_lines), one.candidate.repeats, colour)
-            axes.plot(at, u, shapes[_lines(one)], markeredgewidth=0.6, zorder=2.5, **style_of)
-        lowest = [min(y[: k + 1]) for k in range(len(y))]
-        label = f"{steps} ({own[0].spacing:.3g} mm)"
-        axes.step(x, lowest, where="post", color=colour, linestyle=style, linewidth=1.3, label=label)
-    if plans:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+def _limits(axes: Axes, plans: Sequence[Outcome], family: Family, taken: Outcome | None, minutes: float) -> None:
+    """Not so far that the plan to take cannot be seen."""
+    start = min(one.minutes for one in plans)
+    middle = minutes if math.isfinite(minutes) else taken.minutes if taken else start
+    end = min(max(one.minutes for one in plans), max(FAR * middle, 1.5 * start)) * 1.15
+    within = [_value(one, family) for one in plans if one.minutes <= end]
+    axes.set_xlim(0.0, end)
+    axes.set_yscale("log")
+    axes.set_ylim(0.8 * min(within), 1.6 * sorted(within)[-1 - len(within) // 20])
     plain = FuncFormatter(lambda value, _: f"{value:g}")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(plain)
-        axis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else ""))
-    axes.axvline(minutes, color="#666666", linewidth=0.8, linestyle=(0, (2, 2)))
-    axes.set_title(TITLES[family])
-    axes.set_xlabel("measuring time (min)")
-    axes.set_ylabel(f"largest standard uncertainty ({REPORT_UNIT[_kind(family)]})")
+    axes.yaxis.set_major_formatter(plain)
+    axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else ""))
+
+
+def _staircases(axes: Axes, plans: Sequence[Outcome], family: Family) -> None:
+    """For each number of steps: the best plan until a better one is affordable; named at its end."""
+    _, end = axes.get_xlim()
+    low, high = (math.log(edge) for edge in axes.get_ylim())
+    names: list[tuple[float, str, str]] = []
+    for index, steps in enumerate(sorted({one.candidate.steps for one in plans})):
+        colour, style = series(index)
+        own = sorted((one for one in plans if one.candidate.steps == steps), key=lambda one: one.seconds)
+        x, y, best = [], [], math.inf
+        for one in own:
+            if (value := _value(one, family)) < best and one.minutes <= end:
+                x.append(one.minutes)
+                y.append(best := value)
+        if not x:
+            continue
+        axes.step([*x, end], [*y, best], where="post", color=colour, linestyle=style, linewidth=2.0)
+        axes.plot(x, y, ".", color=colour, markersize=6.0)
+        height = (math.log(best) - low) / (high - low)
+        names.append((height, f"{steps} steps ({own[0].spacing:.3g} mm)", colour))
+    free = 0.0
+    for height, name, colour in sorted(names):
+        free = max(height, free)
+        axes.text(1.005, free, name, va="center", color=colour, transform=axes.transAxes)
+        free += NAME
+
+
+def _mark(axes: Axes, one: Outcome, family: Family, marker: str, words: str) -> None:
+    place = one.minutes, _value(one, family)
+    axes.plot(*place, marker, markersize=11, fillstyle="none", color="black", markeredgewidth=1.6, zorder=3)
+    start, end = axes.get_xlim()
+    right = place[0] > 0.55 * (start + end)
+    said = f"{words}\n{one.minutes:.0f} minutes, {place[1]:.3g} {REPORT_UNIT[_kind(family)]}"
+    axes.annotate(
+        said,
+        place,
+        (-10 if right else 10, 12),
+        textcoords="offset points",
+        ha="right" if right else "left",
+        zorder=4,
+        bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5},
+    )
+
+
+def _said(one: Outcome) -> str:
+    plan = one.candidate
+    times = "" if plan.repeats == 1 else ", twice" if plan.repeats == 2 else f", {plan.repeats} times"
+    return f"{plan.description},\n{plan.steps} steps{times}{', backward too' if plan.backward else ''}"
 
 
 def _value(one: Outcome, family: Family) -> float:

@@ -17,8 +17,8 @@ from stepdiag.style import SERIES
 from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT
 from stepdiag.units import report_value
 
-# Groups that make less than this of every variance are added up.
-SMALL_SHARE = 0.005
+# Groups that make less than this of every variance could not be seen in the figure: they are added up.
+SMALL_SHARE = 0.02
 MOST_GROUPS = len(SERIES)  # that have a colour of their own; the rest is grey
 GREY = "#8c8c8c"
 
@@ -173,7 +173,7 @@ def _columns(shares: Sequence[BudgetShare]) -> dict[str, list[float]]:
     if len(groups) > MOST_GROUPS:
         for group in groups[MOST_GROUPS:]:
             rest = [a + b for a, b in zip(rest, columns.pop(group), strict=True)]
-    if any(abs(part) >= SMALL_SHARE / 10 for part in rest):
+    if any(abs(part) >= SMALL_SHARE / 4 for part in rest):
         columns["others"] = rest
     return columns
 

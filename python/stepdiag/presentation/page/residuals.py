@@ -1,6 +1,6 @@
 """Residuals of the readings, faults among them, and the set-up that was found."""
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,26 @@ from stepdiag.presentation.setup_table import setup_table
 from stepdiag.style import SERIES
 from stepdiag.units import report_value
 
+LEAST_ROOM: Final = 0.05  # of a figure's width for a line
+CONTROLLED: Final = 0.02  # a residual's uncertainty, by the largest of its channel; below, nothing controls the reading
+MOST_NAMED: Final = 16  # lines with so much room
 MOST_POINTS: Final = 3000  # of a channel that are drawn one by one
+
+
+class Visit(NamedTuple):
+    """A line (and run) with its first and last reading in the order of the file, and where they are drawn: each visit
+    has room for its name, however few readings it has."""
+
+    name: str
+    first: int
+    last: int
+    start: float
+    end: float
+
+    @property
+    def places(self) -> FloatArray:
+        count = self.last - self.first + 1
+        return self.start + (self.end - self.start) * (np.arange(count) + 0.5) / count
 
 
 def residuals_section(contents: Contents, figures: Figures) -> Markup:
@@ -27,7 +46,7 @@ def residuals_section(contents: Contents, figures: Figures) -> Markup:
             "p",
             f"Read minus adjusted, in the order of the readings. {details.degrees_of_freedom} degrees of freedom, "
             f"variance factor {shown(details.variance_factor)} (1 is expected), probability {details.probability:.2g}. "
-            f"The band is ± 2 standard uncertainties of a residual.{_not_named(details)}",
+            f"The band of a line is ± 2 standard uncertainties of its residuals.{_uncontrolled(details)}",
         )
     ]
     rows = []
@@ -35,7 +54,7 @@ def residuals_section(contents: Contents, figures: Figures) -> Markup:
         unit, sizes = _in_report(fit)
         figures.add(
             f"figure-residual-{name}",
-            _traces(name, unit, sizes, fit),
+            _traces(name, unit, sizes, fit, details),
             _lines_axis(details),
             _axis(name, unit),
             margin={"l": 64, "r": 10, "t": 8, "b": 40},
@@ -88,34 +107,40 @@ def _in_report(fit: ChannelFit) -> tuple[str, FloatArray]:
     return unit, factor * fit.residual
 
 
-def _traces(name: str, unit: str, sizes: FloatArray, fit: ChannelFit) -> list[dict[str, Any]]:
+def _traces(name: str, unit: str, sizes: FloatArray, fit: ChannelFit, details: FitDetails) -> list[dict[str, Any]]:
     number = np.arange(1, len(sizes) + 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sigma = np.abs(sizes / fit.normalised)
-    sigma = np.where(np.isfinite(sigma), sigma, np.nan)
     drawn = _chosen(sizes)
     good = drawn & fit.used
     bad = ~fit.used & np.isfinite(sizes)
-    half = 2.0 * float(np.nanmedian(sigma)) if np.isfinite(sigma).any() else 0.0
-    band = {"type": "scatter", "mode": "lines", "x": [0.5, len(sizes) + 0.5], "line": {"width": 0}, "hoverinfo": "skip"}
+    place = np.concatenate([visit.places for visit in _visits(details)])
     traces: list[dict[str, Any]] = []
-    if half > 0.0:
-        traces += [
-            band | {"y": [-half, -half]},
-            band | {"y": [half, half], "fill": "tonexty", "fillcolor": BAND},
-        ]
+    for visit in _visits(details):
+        half = 2.0 * _usual_uncertainty(fit, visit)
+        if half > 0.0:
+            band = {"type": "scatter", "mode": "lines", "x": [visit.start, visit.end], "line": {"width": 0}}
+            traces += [
+                band | {"y": [-half, -half], "hoverinfo": "skip"},
+                band | {"y": [half, half], "fill": "tonexty", "fillcolor": BAND, "hoverinfo": "skip"},
+            ]
     points = {
         "type": "scatter",
         "mode": "markers",
-        "hovertemplate": f"reading %{{x}}: %{{y:.3g}} {unit}<extra>{name}</extra>",
+        "hovertemplate": f"reading %{{customdata}}: %{{y:.3g}} {unit}<extra>{name}</extra>",
     }
-    traces.append(
-        points | {"x": number[good].tolist(), "y": sizes[good].tolist(), "marker": {"size": 3.5, "color": LINE}}
-    )
-    if bad.any():
-        marks = {"size": 9, "color": MARK, "symbol": "x"}
-        traces.append(points | {"x": number[bad].tolist(), "y": sizes[bad].tolist(), "marker": marks})
+    marks = {"size": 9, "color": MARK, "symbol": "x"}
+    for which, look in ((good, {"size": 3.5, "color": LINE}), (bad, marks)):
+        if which.any() or which is good:
+            own = {"x": place[which].tolist(), "y": sizes[which].tolist(), "customdata": number[which].tolist()}
+            traces.append(points | own | {"marker": look})
     return traces
+
+
+def _usual_uncertainty(fit: ChannelFit, visit: Visit) -> float:
+    """Of a residual of a visit, in report units; 0 where none is controlled."""
+    part = slice(visit.first, visit.last + 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sigma = np.abs(_in_report(fit)[1][part] / fit.normalised[part])
+    return float(np.median(sigma[np.isfinite(sigma)])) if np.isfinite(sigma).any() else 0.0
 
 
 def _chosen(sizes: FloatArray) -> Any:
@@ -131,35 +156,48 @@ def _chosen(sizes: FloatArray) -> Any:
     return chosen
 
 
-def _visits(details: FitDetails) -> list[tuple[str, int, int]]:
-    """Line (and run) with its first and last reading, from 1, in the order of the file."""
+def _visits(details: FitDetails) -> list[Visit]:
     found: list[tuple[str, int, int]] = []
     several = len(set(details.run)) > 1
-    for number, (line, run) in enumerate(zip(details.line, details.run, strict=True), 1):
+    for number, (line, run) in enumerate(zip(details.line, details.run, strict=True)):
         name = f"{line} · {run}" if several else line
         if found and found[-1][0] == name:
             found[-1] = (name, found[-1][1], number)
         else:
             found.append((name, number, number))
-    return found
+    least = LEAST_ROOM * len(details.line) if len(found) <= MOST_NAMED else 0.0
+    visits, end = [], 0.0
+    for name, first, last in found:
+        start, end = end, end + max(last - first + 1.0, least)
+        visits.append(Visit(name, first, last, start, end))
+    return visits
 
 
 def _lines_axis(details: FitDetails) -> dict[str, Any]:
-    visits = [(name, a, b) for name, a, b in _visits(details) if b - a > 0.02 * len(details.line)]
+    visits = _visits(details)
+    room = LEAST_ROOM * visits[-1].end
+    named = [one for one in visits if one.end - one.start >= 0.5 * room]
     return {
-        "tickvals": [(a + b) / 2 for _, a, b in visits],
-        "ticktext": [name for name, _, _ in visits],
+        "tickvals": [(one.start + one.end) / 2 for one in named],
+        "ticktext": [one.name for one in named],
         "nticks": None,
         "showgrid": False,
-        "range": [0.5, len(details.line) + 0.5],
+        "range": [0.0, visits[-1].end],
         "title": {"text": "line", "standoff": 6},
         "ticks": "",
     }
 
 
-def _not_named(details: FitDetails) -> str:
-    short = [name for name, a, b in _visits(details) if b - a <= 0.02 * len(details.line)]
-    return f" Lines of few readings have no name in the figures: {', '.join(short)}." if 0 < len(short) <= 12 else ""
+def _uncontrolled(details: FitDetails) -> str:
+    """Lines on which other readings do not control what a channel read."""
+    visits = _visits(details)
+    said = []
+    for name, fit in details.channels.items():
+        usual = [_usual_uncertainty(fit, visit) for visit in visits]
+        lines = [visit.name for visit, u in zip(visits, usual, strict=True) if u < CONTROLLED * max(usual)]
+        if 0 < len(lines) <= MOST_NAMED:
+            said.append(f"{name} on {', '.join(lines)}")
+    return f" What no other reading controls fits whatever was read: {'; '.join(said)}." if said else ""
 
 
 def _axis(name: str, unit: str) -> dict[str, Any]:
@@ -169,7 +207,7 @@ def _axis(name: str, unit: str) -> dict[str, Any]:
 def _ends(details: FitDetails) -> list[dict[str, Any]]:
     """A line between two visits."""
     first = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "layer": "below", "line": {"color": GRID, "width": 1}}
-    return [first | {"x0": end + 0.5, "x1": end + 0.5} for _, _, end in _visits(details)[:-1]]
+    return [first | {"x0": one.end, "x1": one.end} for one in _visits(details)[:-1]]
 
 
 def _worst(details: FitDetails) -> list[Markup]:

@@ -106,7 +106,7 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
         "volume",
         "Error of the tool in the volume",
         element("p", said),
-        _controls(scale, before is not None, bool(contents.lines)),
+        _controls(scale, found, has_before=before is not None, has_lines=bool(contents.lines)),
         element(
             "figure",
             drawing,
@@ -129,12 +129,18 @@ def _ranking(figures: VolumeErrors) -> Markup | None:
     return table("What makes it: the error of the tool if one parameter were 0", heading, rows)
 
 
-def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
-    views = [("arrows", "Arrows"), ("grid", "Deformed grid"), ("slice", "Slice")]
+def _controls(scale: float, found: ErrorInVolume, *, has_before: bool, has_lines: bool) -> Markup:
+    """First a level slice through the worst point: nothing in it hides anything else."""
+    views = [("slice", "Slice"), ("grid", "Deformed grid"), ("arrows", "Arrows")]
+    worst = (
+        NODES // 2
+        if math.isnan(found.figures.largest)
+        else int(np.argmin(np.abs(found.nodes[2] - found.figures.largest_at[2])))
+    )
     choices = [
         element(
             "label",
-            element("input", type="radio", name="volume-view", value=value, checked=value == "grid"),
+            element("input", type="radio", name="volume-view", value=value, checked=value == "slice"),
             f" {words}",
         )
         for value, words in views
@@ -159,9 +165,13 @@ def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
         element(
             "div",
             element("label", "Slice across ", for_="slice-axis"),
-            element("select", *(element("option", axis, value=k) for k, axis in enumerate("XYZ")), id="slice-axis"),
+            element(
+                "select",
+                *(element("option", axis, value=k, selected=axis == "Z") for k, axis in enumerate("XYZ")),
+                id="slice-axis",
+            ),
             element("label", " at ", for_="slice-place"),
-            element("input", type="range", id="slice-place", min=0, max=NODES - 1, step=1, value=NODES // 2),
+            element("input", type="range", id="slice-place", min=0, max=NODES - 1, step=1, value=worst),
             element("output", "", for_="slice-place", id="slice-value"),
             class_="control",
         ),
@@ -178,9 +188,7 @@ def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
             )
         )
     if has_lines:
-        parts.append(
-            element("label", element("input", type="checkbox", id="show-lines", checked=True), " measured lines")
-        )
+        parts.append(element("label", element("input", type="checkbox", id="show-lines"), " measured lines"))
     return element(
         "form",
         *parts,
