@@ -226,7 +226,7 @@ class App:
         ending = ".pdf" if given.get("ending") == ".pdf" else ".html"
         name = await asyncio.to_thread(_free, machine, "reports", Path(entry.name).stem, ending)
         words = ["report", *self._of(machine), *before, entry.file, "-o", name]
-        words += _options(given, (*FIELDS, "limit"))
+        words += _options(given, (*FIELDS, "limit", "language"))
         return self._begin(
             f"Report of {entry.name}", [words], machine.name, address(machine.name, "result") + "/{file}"
         )

@@ -50,7 +50,7 @@ def _header_options(command: Command) -> Command:
     groups={
         "Output": ["output", "functional_point", "as_json"],
         "Workpiece": ["workpiece_expansion", "workpiece_temperature"],
-        "Content of a page": ["scenario", "run", "uncertainty", "limit"],
+        "Content of a page": ["scenario", "run", "uncertainty", "limit", "language"],
         "Header of a page (by default that of the scenario)": [*_WORDS, "logo"],
     },
     epilog="\b\nExample: stepdiag report calibration.nc --scenario scenario.toml --run run.csv -o report.html",
@@ -87,6 +87,9 @@ def _header_options(command: Command) -> Command:
 @click.option("--limit", type=float, metavar="UM", help="Limit of the largest error in the volume, in µm.")
 @_header_options
 @click.option("--logo", type=PATH, metavar="FILE", help="PNG or SVG picture.")
+@click.option(
+    "--language", type=click.Choice(["en", "de"]), default="en", show_default=True, help="Language of the page."
+)
 @json_option
 @click.pass_context
 def report(
@@ -102,6 +105,7 @@ def report(
     uncertainty: Path | None,
     limit: float | None,
     logo: Path | None,
+    language: str,
     as_json: bool,
     **words: str | None,
 ) -> None:
@@ -129,7 +133,7 @@ def report(
     path = None if functional_point is None else functional_point.claim(*calibrations)
     before = None
     if output is not None:
-        before = _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, words)
+        before = _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, language, words)
     else:
         given = {"scenario": scenario, "run": run, "uncertainty": uncertainty, "limit": limit, "logo": logo} | words
         for name, value in given.items():
@@ -170,6 +174,7 @@ def _write_page(
     uncertainty: Path | None,
     limit: float | None,
     logo: Path | None,
+    language: str,
     words: Mapping[str, str | None],
 ) -> Calibration | None:
     """Write the page; the calibration before, if there is one."""
@@ -179,7 +184,7 @@ def _write_page(
 
     before = calibrations[0] if len(calibrations) == 2 else None
     tolerance = None if limit is None else limit * MICROMETRE
-    request = ReportRequest(calibrations[-1], before, scenario, run, uncertainty, tolerance, words, logo)
+    request = ReportRequest(calibrations[-1], before, scenario, run, uncertainty, tolerance, words, logo, language)
     path = output.claim(*request.inputs)
     with Progress("report"):
         contents = write_report(request, path)

@@ -35,7 +35,7 @@ _BEGINNINGS: Final = {
     "checkpoint": CHECKPOINT_BEGINS,
     "PNG picture": "\ufffdPNG\r\n\x1a\n",
     "SVG picture": r"(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg\b",
-    "report page": re.escape(PAGE_BEGINS),
+    "report page": re.escape(PAGE_BEGINS).replace("en", "[a-z]{2}", 1),
     "PDF document": "%PDF-",
     "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
     "ISG table": "// stepdiag export --to isg\n",

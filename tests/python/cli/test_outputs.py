@@ -268,6 +268,7 @@ def test_older_result_is_replaced_where_it_can_be_computed_again(
     refusals = {
         "simulate": "perhaps the work of hours: --overwrite replaces it",
         "import": "perhaps the work of hours: --overwrite replaces it",
+        "plan": "exists already, perhaps written by hand: name another file",
         "uncertainty": "is the checkpoint of an earlier run: --resume continues it; or remove it",
         "acquire": "exists already: --resume" if way.ending == ".jsonl" else "move it away, or name another -o",
     }
@@ -275,7 +276,7 @@ def test_older_result_is_replaced_where_it_can_be_computed_again(
     if "--resume" in way.arguments:
         with nothing_is_lost(folder, "a raw file that is complete"):
             assert way.run() == 0
-    elif way.command in ("simulate", "import", "acquire") or way.ending == ".checkpoint":
+    elif way.command in ("simulate", "import", "acquire") or way.ending in (".checkpoint", ".toml"):
         with nothing_is_lost(folder, str(way)):
             assert way.run() == 2
         assert refusals[way.command] in capsys.readouterr().err

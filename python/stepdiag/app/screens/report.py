@@ -36,6 +36,9 @@ def report_screen(machine: MachineFolder, entry: Entry) -> HTMLResponse:
     options += [element("option", f"{one.name} ({one.date[:10]})", value=one.file) for one in reversed(before)]
     chosen = element("select", *options, id="before", name="before")
     fields.append(element("p", element("label", "Before and after: earlier calibration", for_="before"), chosen))
+    languages = [element("option", words, value=code) for code, words in (("en", "English"), ("de", "Deutsch"))]
+    chosen = element("select", *languages, id="language", name="language")
+    fields.append(element("p", element("label", "Language of the report", for_="language"), chosen))
     form = element(
         "form",
         *fields,

@@ -41,6 +41,7 @@ class ReportRequest:
     limit: float | None = None  # of the largest error, mm
     words: Mapping[str, str | None] = field(default_factory=dict)
     logo: Path | None = None
+    language: str = "en"
 
     def command(self, output: Path) -> str:
         """The command that makes this report, with names of files alone."""
@@ -51,6 +52,7 @@ class ReportRequest:
         words += [] if self.limit is None else ["--limit", f"{self.limit * 1e3:.15g}"]
         for name, text in self.words.items():
             words += [] if text is None else [f"--{name.replace('_', '-')}", text]
+        words += [] if self.language == "en" else ["--language", self.language]
         return shlex.join([*words, "-o", output.name])
 
     @property

@@ -9,7 +9,7 @@ import tempfile
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,7 +26,9 @@ from stepdiag.presentation.page.contents import Contents, ReportRequest, read_co
 from stepdiag.presentation.page.curves import curves_section, squareness_section
 from stepdiag.presentation.page.figure import Figures
 from stepdiag.presentation.page.header import TITLES
-from stepdiag.presentation.page.html import Markup, element, markup
+from stepdiag.presentation.page.html import Markup, as_given, element, markup
+from stepdiag.presentation.page.language import LANGUAGES, figure_in_language, in_language, said
+from stepdiag.presentation.page.language import language as language_of_page
 from stepdiag.presentation.page.look import BAND, LAYOUT
 from stepdiag.presentation.page.numbers import moment
 from stepdiag.presentation.page.pdf import find_browser, write_pdf
@@ -47,6 +49,17 @@ from stepdiag.presentation.page.words import (
 from stepdiag.style import COLOUR
 from stepdiag.wrong_arguments import checked
 
+# What report.js says. Numbers stand for {0}, {1}.
+_SCRIPT_WORDS: Final = (
+    "error (µm)",
+    "largest: {0} µm",
+    "10 µm are drawn as {0} mm",
+    "The grid as the tool really moves; {0}. Grey: the commanded volume.",
+    "From commanded to actual position; {0}.",
+    "Length of the error in the plane {0} = {1} mm.",
+    "This browser is too old to draw it; the values are in the table below.",
+)
+
 
 @checked
 def report(
@@ -59,6 +72,7 @@ def report(
     uncertainty: str | PathLike[str] | None = None,
     limit: float | None = None,
     logo: str | PathLike[str] | None = None,
+    language: str = "en",
     **header: str,
 ) -> list[str]:
     """Write the report of a calibration, as `stepdiag report -o` does: one HTML file, or a PDF. Returns notes.
@@ -72,6 +86,7 @@ def report(
         uncertainty: file of an uncertainty result (.nc): the budget.
         limit: of the largest error in the volume, mm.
         logo: PNG or SVG picture.
+        language: of the page, "en" or "de". Sentences without a translation stay English.
         header: what its header says: number, customer, machine, serial_number, operator, instrument, certificate,
             conditions; signatures: who signs, with semicolons between them.
 
@@ -79,6 +94,8 @@ def report(
         InvalidArgument: files are not sound or do not belong together; the header has other keys; Plotly or Chromium
             is missing.
     """
+    if language not in LANGUAGES:
+        raise InvalidArgument(f"`language`: expected one of {', '.join(LANGUAGES)}, got {language}")
     for key in header:
         if key not in TITLES:
             raise InvalidArgument(f"`{key}`: expected one of {', '.join(TITLES)}")
@@ -90,7 +107,7 @@ def report(
             file = Path(calibration)
         of = {"before": before, "scenario": scenario, "run": run, "uncertainty": uncertainty, "logo": logo}
         given = {name: Path(path) for name, path in of.items() if path is not None}
-        request = ReportRequest(file, limit=limit, words=header, **given)
+        request = ReportRequest(file, limit=limit, words=header, language=language, **given)
         return list(write_report(request, Path(output)).notes)
 
 
@@ -113,6 +130,12 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     Raises InvalidArgument without Plotly, and for files that are not sound or do not belong together."""
     plotly = _plotly()
     contents = read_contents(request)
+    with in_language(request.language):
+        return _page(contents, output, plotly), contents
+
+
+def _page(contents: Contents, output: Path, plotly: str) -> str:
+    request = contents.request
     calibration, figures = contents.calibration, Figures()
     change, before = contents.change, None
     if contents.before is not None and change is not None:
@@ -138,8 +161,10 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
         commands_section(contents, request.command(output)),
         signatures_block(contents),
     ]
+    drawings = figure_in_language(figures.drawings)
     data = [
-        _json("stepdiag-figures", {"layout": dict(LAYOUT), "figures": figures.drawings, "colours": dict(COLOUR)}),
+        _json("stepdiag-words", {text: said(text) for text in _SCRIPT_WORDS}),
+        _json("stepdiag-figures", {"layout": dict(LAYOUT), "figures": drawings, "colours": dict(COLOUR)}),
         _json("stepdiag-volume", drawing_of(contents, found, before)),
         _json("stepdiag-values", report_values(contents, found, before)),
     ]
@@ -159,7 +184,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
         ),
         *data,
     ]
-    return _whole(_title(contents), _running_words(contents), body, plotly), contents
+    return _whole(_title(contents), _running_words(contents), body, plotly)
 
 
 def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> dict[str, Any]:
@@ -179,13 +204,14 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
     return values
 
 
-def _title(contents: Contents) -> str:
-    given = contents.header.words
-    machine = given.get("machine", "three-axis machine tool")
-    serial = f", no. {given['serial_number']}" if "serial_number" in given else ""
-    day = f", {contents.calibration.date[:10]}" if contents.calibration.date else ""
-    words = f"Calibration report{' ' + given['number'] if 'number' in given else ''}: {machine}{serial}{day}"
-    return words if is_valid(contents.calibration) else f"{headline(contents.calibration)}. {words}"
+def _title(contents: Contents) -> Markup:
+    given = {key: as_given(text) for key, text in contents.header.words.items()}
+    words: list[object] = [] if is_valid(contents.calibration) else [headline(contents.calibration), ". "]
+    words += ["Calibration report", *([" ", given["number"]] if "number" in given else []), ": "]
+    words.append(given.get("machine", "three-axis machine tool"))
+    words += [", no. ", given["serial_number"]] if "serial_number" in given else []
+    words += [", ", as_given(contents.calibration.date[:10])] if contents.calibration.date else []
+    return markup(*words)
 
 
 def _stamp(calibration: Calibration) -> Markup | None:
@@ -217,7 +243,7 @@ def _contents_list(contents: Contents) -> Markup:
     return element("nav", element("ul", *links), aria_label="Contents", class_="screen-only")
 
 
-def _whole(title: str, running: str, body: list[Markup | None], plotly: str) -> str:
+def _whole(title: Markup, running: str, body: list[Markup | None], plotly: str) -> str:
     own = _own("report.js")
     policy = (
         "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
@@ -240,19 +266,20 @@ def _whole(title: str, running: str, body: list[Markup | None], plotly: str) -> 
         f'<script type="application/gzip" id="stepdiag-plotly">{packed}</script>\n<script>{own}</script>\n'
     )
     inside = Markup("\n").join(part for part in body if part)
-    return f"{PAGE_BEGINS}{head}</head>\n<body>\n{inside}\n{scripts}</body>\n</html>\n"
+    begins = PAGE_BEGINS.replace('lang="en"', f'lang="{language_of_page()}"')
+    return f"{begins}{head}</head>\n<body>\n{inside}\n{scripts}</body>\n</html>\n"
 
 
 def _running_words(contents: Contents) -> str:
     """On every printed page, of a calibration that is not to be relied on: in words, as paper may have no colours."""
     calibration, before = contents.calibration, contents.before
-    said = [] if is_valid(calibration) else [headline(calibration)]
-    said += [] if before is None or is_valid(before) else [headline(before, EARLIER)]
-    if not said:
+    words = [] if is_valid(calibration) else [said(headline(calibration))]
+    words += [] if before is None or is_valid(before) else [said(headline(before, EARLIER))]
+    if not words:
         return ""
     look = "width: 100%; text-align: center; color: #000; border: solid #000; border-width: 1.5pt 0; font: 700 10pt"
     family = 'system-ui, "Liberation Sans", sans-serif'
-    band = f"content: '{'. '.join(said)}'; {look} {family}; margin: 4mm 0"
+    band = f"content: '{'. '.join(words)}'; {look} {family}; margin: 4mm 0"
     return f"@page {{ margin-top: 20mm; @top-center {{ {band}; }} }}\n"
 
 

@@ -6,8 +6,11 @@ from itertools import groupby
 from typing import Final
 
 from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock, VerdictBlock
+from stepdiag.presentation.page.language import is_foreign, said
 
 _MOST_REASONS: Final = 6
+_SAID: Final = ("aria-label", "alt", "title", "placeholder")  # attributes that are words
+_TEXTS: Final = ("p", "li", "dd", "dt", "td", "th", "strong", "figcaption", "caption", "h2", "h3", "summary")
 
 
 class Markup(str):
@@ -16,11 +19,26 @@ class Markup(str):
     __slots__ = ()
 
 
+def as_given(text: str) -> Markup:
+    """A text that is no word of ours, such as a name: escaped, and the same in every language."""
+    return Markup(html.escape(text))
+
+
 def markup(*content: object) -> Markup:
     """The contents one after the other: what is not Markup is escaped, None is left out."""
-    return Markup(
-        "".join(part if isinstance(part, Markup) else html.escape(str(part)) for part in content if part is not None)
-    )
+    return _joined(content)
+
+
+def _joined(content: Iterable[object], *, foreign: bool = False) -> Markup:
+    """foreign: sentences that stay English on a page of another language are marked."""
+    parts = []
+    for part in content:
+        if isinstance(part, Markup):
+            parts.append(part)
+        elif part is not None:
+            text = html.escape(said(str(part)))
+            parts.append(f'<span lang="en">{text}</span>' if foreign and is_foreign(str(part)) else text)
+    return Markup("".join(parts))
 
 
 def element(name: str, /, *content: object, **attributes: object) -> Markup:
@@ -31,11 +49,16 @@ def element(name: str, /, *content: object, **attributes: object) -> Markup:
         if value is None or value is False:
             continue
         key = key.removesuffix("_").replace("_", "-")
-        given.append(f" {key}" if value is True else f' {key}="{html.escape(str(value))}"')
+        words = said(str(value)) if key in _SAID else str(value)
+        given.append(f" {key}" if value is True else f' {key}="{html.escape(words)}"')
     opening = f"<{name}{''.join(given)}>"
     if name in ("meta", "img", "input", "link", "br", "hr"):
         return Markup(opening)
-    return Markup(f"{opening}{markup(*content)}</{name}>")
+    if name in ("code", "pre"):
+        return Markup(
+            f"{opening}{''.join(p if isinstance(p, Markup) else html.escape(str(p)) for p in content)}</{name}>"
+        )
+    return Markup(f"{opening}{_joined(content, foreign=name in _TEXTS)}</{name}>")
 
 
 def table(

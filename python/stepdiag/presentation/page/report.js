@@ -2,6 +2,9 @@
 (() => {
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
   const { layout: common, figures, colours: meaning } = read("stepdiag-figures");
+  const words = read("stepdiag-words");
+  const say = (text, ...values) => words[text].replace(/\{(\d)\}/g, (_, k) => values[k]);
+  const decimal = (text) => (document.documentElement.lang === "de" ? String(text).replace(".", ",") : String(text));
   const root = document.documentElement;
   const config = { displayModeBar: false, responsive: false, scrollZoom: false, doubleClick: false, showTips: false };
   const byId = (id) => document.getElementById(id);
@@ -54,7 +57,7 @@
   const largest = Math.max(...[errors.error_um, errors.before_um].filter(Boolean).flatMap((all) => all.map(size)));
   const colours = {
     colorscale: "Cividis", cmin: 0, cmax: largest, showscale: true,
-    colorbar: { title: { text: "error (µm)", side: "right" }, thickness: 12, len: 0.6, outlinewidth: 0 },
+    colorbar: { title: { text: say("error (µm)"), side: "right" }, thickness: 12, len: 0.6, outlinewidth: 0 },
   };
   const label = (p, e) => `X ${p[0]}, Y ${p[1]}, Z ${p[2]} mm<br>${size(e).toFixed(2)} µm (${e.map((c) => c.toFixed(2)).join(", ")})`;
   const path = (name, extra) => ({ type: "scatter3d", mode: "lines", name, x: [], y: [], z: [], ...extra });
@@ -141,7 +144,7 @@
     const p = worst.at_mm.map((x, d) => x + moved * worst.error_um[d]);
     return [{
       type: "scatter3d", mode: "markers+text", name: "worst point", x: [p[0]], y: [p[1]], z: [p[2]],
-      marker: { size: 6, color: meaning.rejected, symbol: "diamond" }, text: [`largest: ${size(worst.error_um).toFixed(1)} µm`],
+      marker: { size: 6, color: meaning.rejected, symbol: "diamond" }, text: [say("largest: {0} µm", decimal(size(worst.error_um).toFixed(1)))],
       textposition: "top center", textfont: { size: 13, color: meaning.rejected }, hovertext: [label(worst.at_mm, worst.error_um)], hoverinfo: "text",
     }];
   }
@@ -156,11 +159,11 @@
     const letter = "XYZ"[axis];
     byId("exaggeration-value").textContent = `× ${Math.round(factor * 1e3).toLocaleString("en").replaceAll(",", "\u202f")}`;
     byId("slice-value").textContent = `${letter} ${Number(nodes[axis][place].toFixed(1))} mm`;
-    const drawnAs = `10 µm are drawn as ${Number((10 * factor).toPrecision(3))} mm`;
+    const drawnAs = say("10 µm are drawn as {0} mm", decimal(Number((10 * factor).toPrecision(3))));
     byId("volume-caption").textContent = {
-      grid: `The grid as the tool really moves; ${drawnAs}. Grey: the commanded volume.`,
-      arrows: `From commanded to actual position; ${drawnAs}.`,
-      slice: `Length of the error in the plane ${letter} = ${Number(nodes[axis][place].toFixed(1))} mm.`,
+      grid: say("The grid as the tool really moves; {0}. Grey: the commanded volume.", drawnAs),
+      arrows: say("From commanded to actual position; {0}.", drawnAs),
+      slice: say("Length of the error in the plane {0} = {1} mm.", letter, decimal(Number(nodes[axis][place].toFixed(1)))),
     }[view];
   }
   const axis3d = (k) => ({
@@ -241,6 +244,6 @@
     }
   }
   unpack().then(start, () => {
-    byId("volume-caption").textContent = "This browser is too old to draw it; the values are in the table below.";
+    byId("volume-caption").textContent = say("This browser is too old to draw it; the values are in the table below.");
   });
 })();

@@ -20,7 +20,7 @@ MOST_NAMED: Final = 16  # lines with so much room
 MOST_POINTS: Final = 3000  # of a channel that are drawn one by one
 
 
-class Visit(NamedTuple):
+class DrawnVisit(NamedTuple):
     """A line (and run) with its first and last reading in the order of the file, and where they are drawn: each visit
     has room for its name, however few readings it has."""
 
@@ -135,7 +135,7 @@ def _traces(name: str, unit: str, sizes: FloatArray, fit: ChannelFit, details: F
     return traces
 
 
-def _usual_uncertainty(fit: ChannelFit, visit: Visit) -> float:
+def _usual_uncertainty(fit: ChannelFit, visit: DrawnVisit) -> float:
     """Of a residual of a visit, in report units; 0 where none is controlled."""
     part = slice(visit.first, visit.last + 1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -156,7 +156,7 @@ def _chosen(sizes: FloatArray) -> Any:
     return chosen
 
 
-def _visits(details: FitDetails) -> list[Visit]:
+def _visits(details: FitDetails) -> list[DrawnVisit]:
     found: list[tuple[str, int, int]] = []
     several = len(set(details.run)) > 1
     for number, (line, run) in enumerate(zip(details.line, details.run, strict=True)):
@@ -169,7 +169,7 @@ def _visits(details: FitDetails) -> list[Visit]:
     visits, end = [], 0.0
     for name, first, last in found:
         start, end = end, end + max(last - first + 1.0, least)
-        visits.append(Visit(name, first, last, start, end))
+        visits.append(DrawnVisit(name, first, last, start, end))
     return visits
 
 

@@ -18,6 +18,7 @@ from stepdiag.presentation.page.contents import Contents
 from stepdiag.presentation.page.header import TITLES
 from stepdiag.presentation.page.html import (
     Markup,
+    as_given,
     definitions,
     element,
     html_of,
@@ -54,22 +55,25 @@ def header_block(contents: Contents) -> Markup:
     """Title, logo, and who, which machine, with what."""
     calibration, words = contents.calibration, contents.header.words
     pairs: list[tuple[str, object]] = [
-        (title, words[key]) for key, title in TITLES.items() if key in words and key != "signatures"
+        (title, as_given(words[key])) for key, title in TITLES.items() if key in words and key != "signatures"
     ]
     pairs += [
         ("Calibrated volume", f"{' × '.join(position(edge) for edge in calibration.volume)} mm"),
-        ("Kinematic chain", calibration.chain.name),
+        ("Kinematic chain", as_given(calibration.chain.name)),
         ("Evaluated", moment(calibration.date) or "date not known"),
         ("Report made", moment(contents.date)),
     ]
     logo = element("img", src=contents.header.logo, alt="Logo", class_="logo") if contents.header.logo else None
-    number = f"no. {words['serial_number']}" if "serial_number" in words else ""
+    named: list[object] = [as_given(words["machine"])] if "machine" in words else []
+    if "serial_number" in words:
+        named += [", "] if named else []
+        named += ["no. ", as_given(words["serial_number"])]
     return element(
         "header",
         element(
             "div",
             element("p", "Calibration report", class_="kind"),
-            element("h1", ", ".join(filter(None, (words.get("machine"), number))) or "Three-axis machine tool"),
+            element("h1", *(named or ["Three-axis machine tool"])),
             element("p", "Geometric errors by the laser step-diagonal method", class_="subject"),
         ),
         logo,
@@ -83,7 +87,7 @@ def signatures_block(contents: Contents) -> Markup | None:
     names = [name.strip() for name in contents.header.words.get("signatures", "").split(";") if name.strip()]
     if not names:
         return None
-    lines = [element("p", element("span", class_="line"), f"Date, signature: {name}") for name in names]
+    lines = [element("p", element("span", class_="line"), "Date, signature: ", as_given(name)) for name in names]
     return section("signatures", "Signatures", element("div", *lines, class_="signatures"))
 
 
@@ -302,14 +306,11 @@ def provenance_section(contents: Contents) -> Markup:
         ("Run", contents.request.run),
         ("Uncertainty", contents.request.uncertainty),
     ]
-    parts.append(
-        element(
-            "p",
-            "Files of this report: "
-            + "; ".join(f"{what.lower()} {path.name}" for what, path in files if path is not None)
-            + ".",
-        )
-    )
+    named: list[object] = ["Files of this report: "]
+    for what, path in files:
+        if path is not None:
+            named += ["; " if len(named) > 1 else None, what.lower(), " ", element("code", path.name)]
+    parts.append(element("p", *named))
     return section("provenance", "Provenance", *parts)
 
 
