@@ -31,7 +31,7 @@ def markup(*content: object) -> Markup:
 
 def _joined(content: Iterable[object], *, foreign: bool = False) -> Markup:
     """foreign: sentences that stay English on a page of another language are marked."""
-    parts = []
+    parts: list[str] = []
     for part in content:
         if isinstance(part, Markup):
             parts.append(part)

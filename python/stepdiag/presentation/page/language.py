@@ -7,7 +7,7 @@ their own. What no entry has stays English, and is marked so for those who liste
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -15,6 +15,7 @@ from importlib.resources import files
 from typing import Any, Final
 
 LANGUAGES: Final = ("en", "de")
+_THOUSANDS: Final = re.compile(r"(?<=\d),(?=\d{3}(?!\d))")
 _DECIMAL: Final = re.compile(r"(?<![\d.])(\d+)\.(\d+)(?!\.?\d)")
 _ENDS: Final = ".,;:"
 _INSIDE: Final = re.compile(rf"(\s*)(.*?)([{_ENDS}]?\s*)", re.DOTALL)
@@ -39,20 +40,23 @@ class Catalogue:
         ]
         self._patterns.sort(key=lambda pattern: -pattern[0])
 
-    def said(self, text: str) -> str | None:
-        """A text in the language; None where no part of it has an entry. Blanks and commas around it stay."""
+    def said(self, text: str, *, whole: bool = False) -> str | None:
+        """A text in the language; None where no part of it has an entry, or with `whole` where a part has none. Blanks
+        and commas around it stay."""
         match = _INSIDE.fullmatch(text)
         if match is None:
             return None
         before, inside, after = match.groups()
         found = (
             next(filter(None, map(self._exact.get, _forms(inside))), None)
-            or self._in_parts(inside, _BETWEEN[0], all)
-            or self._in_parts(inside, _BETWEEN[1], all)
+            or self._in_parts(inside, _BETWEEN[0], whole=True)
+            or self._in_parts(inside, _BETWEEN[1], whole=True)
             or self._by_pattern(inside)
-            or next(filter(None, (self._in_parts(inside, between, any) for between in _BETWEEN)), None)
-            or (self._by_pattern(inside, short=True) if len(inside) <= _SHORT else None)
         )
+        if found is None and not whole:
+            found = next(filter(None, (self._in_parts(inside, between, whole=False) for between in _BETWEEN)), None)
+        if found is None and len(inside) <= _SHORT:
+            found = self._by_pattern(inside, short=True)
         if found is None:
             return None
         begins = inside[:1].isupper() and inside not in self._exact
@@ -65,10 +69,10 @@ class Catalogue:
                 return translation.format(*(self.said(part) or part for part in match.groups()))
         return None
 
-    def _in_parts(self, text: str, between: str, enough: Callable[[list[str | None]], bool]) -> str | None:
+    def _in_parts(self, text: str, between: str, *, whole: bool) -> str | None:
         parts = re.split(between, text)
-        found = [self.said(part) for part in parts] if len(parts) > 1 else []
-        if not found or not enough(found):
+        found = [self.said(part, whole=whole) for part in parts] if len(parts) > 1 else []
+        if not any(found) or (whole and not all(found)):
             return None
         return " ".join(one or part for one, part in zip(found, parts, strict=True))
 
@@ -110,7 +114,7 @@ def language() -> str:
 def said(text: str) -> str:
     """A text of the page in its language, with its decimal sign."""
     now = _NOW.get()
-    return text if now is None else _DECIMAL.sub(r"\1,\2", now.said(text) or text)
+    return text if now is None else _DECIMAL.sub(r"\1,\2", _THOUSANDS.sub("\u202f", now.said(text) or text))
 
 
 def is_foreign(text: str) -> bool:

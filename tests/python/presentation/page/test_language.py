@@ -34,7 +34,7 @@ class Texts(HTMLParser):
         if tag == "html":
             self.language = given["lang"] or ""
         if tag not in ("meta", "img", "input", "link", "br", "hr"):
-            self._inside.append("english" if given.get("lang") == "en" else tag)
+            self._inside.append("english" if given.get("lang") == "en" and tag == "span" else tag)
 
     def handle_endtag(self, tag: str) -> None:
         self._inside.pop()
@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Calibrations that are accepted, doubtful and rejected."""
     folder = tmp_path_factory.mktemp("german")
     noisy = SCENARIO.replace("distance_um = 0.1", "distance_um = 0.1\ntilt_urad = 1.0")
-    runs = {"accepted": noisy, "doubtful": noisy.replace("distance_um = 0.1\nt", "distance_um = 0.17\nt")}
+    runs = {"accepted": noisy, "doubtful": noisy.replace("distance_um = 0.1\nt", "distance_um = 0.25\nt")}
     with pytest.MonkeyPatch.context() as patched:
         patched.chdir(folder)
         Path("scenario.toml").write_text(noisy)
