@@ -116,6 +116,8 @@ def grid_of(page: Page) -> Any:
 
 def test_slider_moves_the_grid_and_the_keyboard_reaches_it(report: Seen) -> None:
     page = report.page
+    page.get_by_label("Deformed grid").check()
+    page.wait_for_function("document.getElementById('figure-volume').data.some(t => t.name === 'deformed')")
     page.evaluate("document.activeElement.blur()")
     for _ in range(60):
         page.keyboard.press("Tab")
@@ -263,6 +265,6 @@ def test_volume_is_on_paper_as_it_is_on_the_screen(browser: Browser, folder: Pat
         pixels = imread(file)[:, :, :3]
         text = np.ptp(pixels, axis=2) > 0.15
         blues = max(blues, int(np.count_nonzero(text)))
-    assert blues > 4000, "the deformed grid covers much of a page"
+    assert blues > 4000, "the slice covers much of a page"
     assert seen.errors == []
     seen.page.close()
