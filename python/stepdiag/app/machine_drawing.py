@@ -106,7 +106,8 @@ class MachineDrawing:
         taken: list[FloatArray] = []
         for one in lines:
             place, mirror = self.at(one.head), self.at(one.first.positions[0])
-            out = (place - mirror) / max(float(np.linalg.norm(place - mirror)), 1e-9)
+            length = float(np.linalg.norm(place - mirror))  # 0 of a line towards the viewer, and without a standoff
+            out = (place - mirror) / length if length > 1e-6 else np.array([0.0, 1.0])
             while any(np.linalg.norm(place - other) < 2.0 * _RADIUS + 1.0 for other in taken):
                 place = place + 2.0 * out
             taken.append(place)

@@ -1,9 +1,11 @@
 """The application: who is let in, what a page can reach, and that its changes are commands on the book."""
 
+import math
 import re
 import shlex
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
@@ -12,6 +14,7 @@ from starlette.testclient import TestClient
 
 import stepdiag as sd
 from stepdiag.app import security
+from stepdiag.app.machine_drawing import plan_figure, planned_lines
 from stepdiag.app.routes import application
 from stepdiag.cli import main
 
@@ -366,6 +369,17 @@ def test_searched_plan_becomes_that_of_the_next_run(person: TestClient) -> None:
     assert f"{plan.steps} per axis" in shown
     other = person.get("/machines/VMC-1200/plan?scenario=scenarios/few.toml").text
     assert '<option value="scenarios/few.toml" selected>' in other
+
+
+def test_heads_at_one_place_are_drawn_apart(book: Path) -> None:
+    """Without a standoff they stand where the mirror is: nothing says in which direction to move their circles."""
+    known = sd.read_scenario(book / "scenario.toml").known
+    lines = [replace(one, head=one.first.positions[0]) for one in planned_lines(known)]
+    shown = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', plan_figure(known, lines))
+    places = [(float(x), float(y)) for x, y in shown]
+    apart = [math.dist(a, b) for k, a in enumerate(places) for b in places[:k]]
+    assert len(places) == len(lines)
+    assert min(apart) > 22.0
 
 
 def judged(name: str, fit: str, date: str) -> None:
