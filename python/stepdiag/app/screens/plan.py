@@ -156,7 +156,7 @@ def _search(machine: MachineFolder, chosen: Entry) -> Markup:
     return section(
         "search",
         "Which plan is best in the time I have?",
-        element("p", "Searches lines, steps and repeats for this head and its noise. It takes some seconds."),
+        element("p", "Searches lines, steps and repeats for this head and its noise. It takes seconds for a short time, minutes for a long one."),
         _form(
             machine.name,
             chosen,

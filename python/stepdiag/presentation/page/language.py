@@ -7,7 +7,7 @@ their own. What no entry has stays English, and is marked so for those who liste
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -40,23 +40,19 @@ class Catalogue:
         ]
         self._patterns.sort(key=lambda pattern: -pattern[0])
 
-    def said(self, text: str, *, whole: bool = False) -> str | None:
-        """A text in the language; None where no part of it has an entry, or with `whole` where a part has none. Blanks
-        and commas around it stay."""
+    def said(self, text: str) -> str | None:
+        """A text in the language; None where a sentence or part of it has no entry. Blanks and commas around it stay."""
         match = _INSIDE.fullmatch(text)
         if match is None:
             return None
         before, inside, after = match.groups()
         found = (
             next(filter(None, map(self._exact.get, _forms(inside))), None)
-            or self._in_parts(inside, _BETWEEN[0], whole=True)
-            or self._in_parts(inside, _BETWEEN[1], whole=True)
+            or self._in_parts(inside, _BETWEEN[:2])
             or self._by_pattern(inside)
+            or self._in_parts(inside, _BETWEEN[2:])
+            or (self._by_pattern(inside, short=True) if len(inside) <= _SHORT else None)
         )
-        if found is None and not whole:
-            found = next(filter(None, (self._in_parts(inside, between, whole=False) for between in _BETWEEN)), None)
-        if found is None and len(inside) <= _SHORT:
-            found = self._by_pattern(inside, short=True)
         if found is None:
             return None
         begins = inside[:1].isupper() and inside not in self._exact
@@ -69,12 +65,14 @@ class Catalogue:
                 return translation.format(*(self.said(part) or part for part in match.groups()))
         return None
 
-    def _in_parts(self, text: str, between: str, *, whole: bool) -> str | None:
-        parts = re.split(between, text)
-        found = [self.said(part, whole=whole) for part in parts] if len(parts) > 1 else []
-        if not any(found) or (whole and not all(found)):
-            return None
-        return " ".join(one or part for one, part in zip(found, parts, strict=True))
+    def _in_parts(self, text: str, separators: Sequence[str]) -> str | None:
+        """Each part in the language; one without English words, such as a name or a number, stays."""
+        for separator in separators:
+            parts = re.split(separator, text)
+            found = [self.said(part) for part in parts] if len(parts) > 1 else []
+            if any(found) and all(one or not _ENGLISH.search(part) for one, part in zip(found, parts, strict=True)):
+                return " ".join(one or part for one, part in zip(found, parts, strict=True))
+        return None
 
 
 def _forms(text: str) -> Iterator[str]:

@@ -46,7 +46,8 @@ def residuals_section(contents: Contents, figures: Figures) -> Markup:
             "p",
             f"Read minus adjusted, in the order of the readings. {details.degrees_of_freedom} degrees of freedom, "
             f"variance factor {shown(details.variance_factor)} (1 is expected), probability {details.probability:.2g}. "
-            f"The band of a line is ± 2 standard uncertainties of its residuals.{_uncontrolled(details)}",
+            f"The band of a line is ± 2 standard uncertainties of its residuals.{_unnamed(details)}"
+            f"{_uncontrolled(details)}",
         )
     ]
     rows = []
@@ -175,8 +176,7 @@ def _visits(details: FitDetails) -> list[DrawnVisit]:
 
 def _lines_axis(details: FitDetails) -> dict[str, Any]:
     visits = _visits(details)
-    room = LEAST_ROOM * visits[-1].end
-    named = [one for one in visits if one.end - one.start >= 0.5 * room]
+    named = _named(visits)
     return {
         "tickvals": [(one.start + one.end) / 2 for one in named],
         "ticktext": [one.name for one in named],
@@ -186,6 +186,15 @@ def _lines_axis(details: FitDetails) -> dict[str, Any]:
         "title": {"text": "line", "standoff": 6},
         "ticks": "",
     }
+
+
+def _named(visits: list[DrawnVisit]) -> list[DrawnVisit]:
+    return [one for one in visits if one.end - one.start >= 0.5 * LEAST_ROOM * visits[-1].end]
+
+
+def _unnamed(details: FitDetails) -> str:
+    visits = _visits(details)
+    return " A line too short for its name is named when pointed at." if len(_named(visits)) < len(visits) else ""
 
 
 def _uncontrolled(details: FitDetails) -> str:
