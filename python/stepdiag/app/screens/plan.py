@@ -156,7 +156,10 @@ def _search(machine: MachineFolder, chosen: Entry) -> Markup:
     return section(
         "search",
         "Which plan is best in the time I have?",
-        element("p", "Searches lines, steps and repeats for this head and its noise. It takes seconds for a short time, minutes for a long one."),
+        element(
+            "p",
+            "Searches lines, steps and repeats for this head and its noise. Minutes, if there is much time for lines.",
+        ),
         _form(
             machine.name,
             chosen,

@@ -41,7 +41,7 @@ class Catalogue:
         self._patterns.sort(key=lambda pattern: -pattern[0])
 
     def said(self, text: str) -> str | None:
-        """A text in the language; None where a sentence or part of it has no entry. Blanks and commas around it stay."""
+        """A text in the language; None where a part of it has no entry. Blanks and commas around it stay."""
         match = _INSIDE.fullmatch(text)
         if match is None:
             return None
