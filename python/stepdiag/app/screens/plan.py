@@ -158,7 +158,7 @@ def _search(machine: MachineFolder, chosen: Entry) -> Markup:
         "Which plan is best in the time I have?",
         element(
             "p",
-            "Searches lines, steps and repeats for this head and its noise. Minutes, if there is much time for lines.",
+            "Searches lines, steps and repeats for this head and its noise. A long time to plan for takes minutes.",
         ),
         _form(
             machine.name,
