@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag.acquisition.acquire import acquire, raw_path
-from stepdiag.acquisition.ids3010 import Ids3010
-from stepdiag.acquisition.ids3010_messages import JsonStream
-from stepdiag.acquisition.instrument import InstrumentError
-from stepdiag.acquisition.line_instrument import parse_header, parse_sample
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import _expectation
 from stepdiag.acquisition.triggers import KeyTrigger
+from stepdiag.instruments.ids3010 import Ids3010
+from stepdiag.instruments.ids3010_messages import JsonStream
+from stepdiag.instruments.instrument import InstrumentError
+from stepdiag.instruments.line_instrument import parse_header, parse_sample
 from stepdiag.scenario.description import parse_scenario
 from stepdiag.scenario.order_of_run import Visit
 from stepdiag.twin.instrument import TwinInstrument

@@ -7,10 +7,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010 import Ids3010, parse_source
-from stepdiag.acquisition.ids3010_instrument import Ids3010Instrument
-from stepdiag.acquisition.instrument import Instrument, InstrumentError
-from stepdiag.acquisition.line_instrument import line_instrument
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
 from stepdiag.acquisition.raw_records import Header, Record
@@ -19,6 +15,10 @@ from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Operator, Silent, Trigger
 from stepdiag.acquisition.visit_loop import Acquisition, Resume
+from stepdiag.instruments.ids3010 import Ids3010, parse_source
+from stepdiag.instruments.ids3010_instrument import Ids3010Instrument
+from stepdiag.instruments.instrument import Instrument, InstrumentError
+from stepdiag.instruments.line_instrument import line_instrument
 from stepdiag.io.data_files import write_measurement
 from stepdiag.io.whole_files import check_output
 from stepdiag.scenario.description import Scenario

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag.acquisition.instrument import ReadColumn, Row
 from stepdiag.acquisition.triggers import AXES
+from stepdiag.instruments.instrument import ReadColumn, Row
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit
 

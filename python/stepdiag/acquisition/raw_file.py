@@ -14,8 +14,8 @@ from types import TracebackType
 from typing import Final, Self
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.instrument import Number
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Value, parse_record
+from stepdiag.instruments.instrument import Number
 from stepdiag.io.whole_files import check_output, read_bytes, reason, sync_folder
 
 _BEGINNING: Final = b'{"record":"header"'

@@ -14,9 +14,9 @@ from pydantic import (
 from pydantic_core import from_json
 
 from stepdiag._core import InvalidArgument, newer_format
-from stepdiag.acquisition.instrument import Number, ReadColumn
 from stepdiag.acquisition.settling import ValueKind
 from stepdiag.config.key_types import Section, Triple
+from stepdiag.instruments.instrument import Number, ReadColumn
 
 LATEST: Final = 2  # version of the format
 LARGEST: Final = 2**63  # pm; 9 km

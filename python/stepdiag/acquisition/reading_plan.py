@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010 import AXES
 from stepdiag.acquisition.raw_records import Visited
+from stepdiag.instruments.ids3010 import AXES
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
 

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument, Measurement
-from stepdiag.acquisition.instrument import Number, ReadColumn
 from stepdiag.acquisition.raw_file import RawContent, read_raw
 from stepdiag.acquisition.raw_records import RawReading, TemperatureRow, Visited
 from stepdiag.config.toml_text import located
+from stepdiag.instruments.instrument import Number, ReadColumn
 from stepdiag.io.data_files import write_measurement
 from stepdiag.units import native
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final, NoReturn
 
-from stepdiag.acquisition.instrument import ReadColumn, Row, change_of_distance
 from stepdiag.acquisition.settling import Reading, Settling, spread
 from stepdiag.acquisition.triggers import Context, Missed, Seldom, Stopped, keeps, of_start, point_text
+from stepdiag.instruments.instrument import ReadColumn, Row, change_of_distance
 from stepdiag.scenario.order_of_run import Visit
 
 # mm. A rest is the next point if it is within this share of the plan's shortest step of it. It is

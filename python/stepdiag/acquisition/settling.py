@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Literal
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.instrument import EXPONENTS, Number, ReadColumn, Row, Sample
+from stepdiag.instruments.instrument import EXPONENTS, Number, ReadColumn, Row, Sample
 from stepdiag.option_field import option
 
 

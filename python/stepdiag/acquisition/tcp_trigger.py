@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.instrument import Row
 from stepdiag.acquisition.settling import Reading
 from stepdiag.acquisition.triggers import Context, Seldom, Stopped, keeps, of_start, point_text
+from stepdiag.instruments.instrument import Row
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.order_of_run import Visit
 

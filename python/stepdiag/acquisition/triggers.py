@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Row, Sample, change_of_distance
 from stepdiag.acquisition.settling import Reading, Settling
+from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Row, Sample, change_of_distance
 from stepdiag.scenario.order_of_run import Visit
 
 AXES: Final = "XYZ"

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from stepdiag._core import __version__
-from stepdiag.acquisition.instrument import Instrument, Row, mean_distance
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.point_check import PointCheck
 from stepdiag.acquisition.raw_file import RawContent, RawFile
@@ -16,6 +15,7 @@ from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Context, Missed, Operator, Trigger, point_text
+from stepdiag.instruments.instrument import Instrument, Row, mean_distance
 from stepdiag.mistakes.nominal_way import Way, line_remark
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag.acquisition.instrument import PICOMETRES
 from stepdiag.demo.loop_cases import CHAIN, RANGE
+from stepdiag.instruments.instrument import PICOMETRES
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.twin.instrument import TwinInstrument

@@ -11,9 +11,9 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010 import AXES, IDLE, RUNNING
-from stepdiag.acquisition.instrument import columns_of_signals
 from stepdiag.acquisition.reading_plan import channels_of_axes, described_plan, digest_of
+from stepdiag.instruments.ids3010 import AXES, IDLE, RUNNING
+from stepdiag.instruments.instrument import columns_of_signals
 from stepdiag.scenario.description import Scenario, simulation_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.order_of_run import visits_of

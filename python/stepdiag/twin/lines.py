@@ -10,10 +10,10 @@ from collections.abc import Callable
 from typing import Any, Final, TypeGuard
 
 from stepdiag._core import InvalidArgument, __version__
-from stepdiag.acquisition.ids3010 import TWIN
-from stepdiag.acquisition.ids3010_messages import JsonStream
-from stepdiag.acquisition.instrument import EXPONENTS
-from stepdiag.acquisition.line_instrument import VERSION
+from stepdiag.instruments.ids3010 import TWIN
+from stepdiag.instruments.ids3010_messages import JsonStream
+from stepdiag.instruments.instrument import EXPONENTS
+from stepdiag.instruments.line_instrument import VERSION
 from stepdiag.twin.instrument import TwinInstrument
 
 BETWEEN_SAMPLES: Final = 0.002  # s

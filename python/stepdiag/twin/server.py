@@ -16,8 +16,8 @@ from types import TracebackType
 from typing import Any, Literal, Self, get_args
 
 from stepdiag._core import InvalidArgument, __version__
-from stepdiag.acquisition.ids3010 import AXES, INTERFACES, RUNNING, TWIN
-from stepdiag.acquisition.ids3010_messages import JsonStream, encoded
+from stepdiag.instruments.ids3010 import AXES, INTERFACES, RUNNING, TWIN
+from stepdiag.instruments.ids3010_messages import JsonStream, encoded
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.scenario.order_of_run import visits_of

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stepdiag.acquisition.acquire import Acquired, acquire
-from stepdiag.acquisition.instrument import columns_of_signals
 from stepdiag.acquisition.point_check import MOST, PointCheck
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.triggers import KeyTrigger
 from stepdiag.cli.acquire import _Terminal
+from stepdiag.instruments.instrument import columns_of_signals
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import Scenario, parse_scenario, simulate_scenario
 from stepdiag.scenario.order_of_run import visits_of

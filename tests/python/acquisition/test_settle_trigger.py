@@ -13,11 +13,11 @@ from acquiring import SMALL, Listener, fast, points_of, scenario
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import acquire
-from stepdiag.acquisition.instrument import ReadColumn, Sample
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.settle_trigger import SettleTrigger
 from stepdiag.acquisition.settling import Reading, Settling, take_reading
 from stepdiag.acquisition.triggers import Context, Missed, Stopped
+from stepdiag.instruments.instrument import ReadColumn, Sample
 from stepdiag.io.data_files import read_measurement
 from stepdiag.program.options import Options, space_of
 from stepdiag.program.path import Align, Feed, Read, actions_of

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.instrument import ReadColumn, Sample
 from stepdiag.acquisition.settling import Settling, take_reading
+from stepdiag.instruments.instrument import ReadColumn, Sample
 
 MICROMETRE = 1_000_000  # pm
 BEAMS = [ReadColumn(f"d{i}", "pm") for i in (1, 2, 3)]

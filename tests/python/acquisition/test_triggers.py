@@ -19,12 +19,12 @@ from acquiring import Controller, Listener, fast, points_of, scenario
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import Acquired, acquire
-from stepdiag.acquisition.instrument import InstrumentError
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.settle_trigger import SettleTrigger
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import KeyTrigger, Stopped, Trigger
+from stepdiag.instruments.instrument import InstrumentError
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.twin.instrument import TwinBehaviour

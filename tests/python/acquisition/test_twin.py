@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stepdiag._core import InvalidArgument, VirtualReadout
-from stepdiag.acquisition.ids3010 import Ids3010
-from stepdiag.acquisition.instrument import InstrumentError
+from stepdiag.instruments.ids3010 import Ids3010
+from stepdiag.instruments.instrument import InstrumentError
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.twin.instrument import TwinBehaviour

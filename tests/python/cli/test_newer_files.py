@@ -13,8 +13,8 @@ from places import SHIPPED_HEADS
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag.acquisition.line_instrument import parse_header
 from stepdiag.cli import main
+from stepdiag.instruments.line_instrument import parse_header
 
 NEWER = f": it is for a newer stepdiag than {sd.__version__}; install that one"
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag.acquisition.acquire import Acquired, acquire
-from stepdiag.acquisition.ids3010 import Ids3010
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
+from stepdiag.instruments.ids3010 import Ids3010
 from stepdiag.scenario.description import Scenario, parse_scenario
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.twin.server import Twin

@@ -11,9 +11,9 @@ from acquiring import instrument, reply, sound
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stepdiag.acquisition.ids3010 import LARGEST_POSITION, Ids3010, Positions
-from stepdiag.acquisition.ids3010_messages import LARGEST, JsonStream
-from stepdiag.acquisition.instrument import InstrumentError
+from stepdiag.instruments.ids3010 import LARGEST_POSITION, Ids3010, Positions
+from stepdiag.instruments.ids3010_messages import LARGEST, JsonStream
+from stepdiag.instruments.instrument import InstrumentError
 
 Request = dict[str, Any]
 

@@ -20,13 +20,13 @@ from places import EXAMPLES, SHIPPED_HEADS
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import Acquired, acquire
-from stepdiag.acquisition.instrument import InstrumentError, Sample
-from stepdiag.acquisition.line_instrument import LineInstrument, parse_header, parse_sample
-from stepdiag.acquisition.line_streams import LONGEST
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.triggers import KeyTrigger
+from stepdiag.instruments.instrument import InstrumentError, Sample
+from stepdiag.instruments.line_instrument import LineInstrument, parse_header, parse_sample
+from stepdiag.instruments.line_streams import LONGEST
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
 from stepdiag.twin.instrument import TwinBehaviour

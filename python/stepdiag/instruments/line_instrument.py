@@ -14,9 +14,9 @@ from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
 from stepdiag._core import InvalidArgument, newer_format
-from stepdiag.acquisition.ids3010_messages import shown
-from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Sample, columns_of_signals
-from stepdiag.acquisition.line_streams import Connection, LineFeed, ProgramOutput, Stream
+from stepdiag.instruments.ids3010_messages import shown
+from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Sample, columns_of_signals
+from stepdiag.instruments.line_streams import Connection, LineFeed, ProgramOutput, Stream
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.known import Known
 

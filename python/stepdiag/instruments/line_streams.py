@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import IO, Final, Protocol
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010_messages import shown
-from stepdiag.acquisition.instrument import InstrumentError
+from stepdiag.instruments.ids3010_messages import shown
+from stepdiag.instruments.instrument import InstrumentError
 from stepdiag.io.whole_files import reason
 
 LONGEST: Final = 2**16  # bytes of a line

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Literal, Self
 
-from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010
-from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Sample
+from stepdiag.instruments.ids3010 import RUNNING, STARTING, TWIN, Ids3010
+from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Sample
 
 
 class Ids3010Instrument:

@@ -12,8 +12,8 @@ from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010_messages import JsonStream, encoded, shown
-from stepdiag.acquisition.instrument import InstrumentError
+from stepdiag.instruments.ids3010_messages import JsonStream, encoded, shown
+from stepdiag.instruments.instrument import InstrumentError
 from stepdiag.io.whole_files import reason
 
 PORT: Final = 9090
