@@ -7,20 +7,22 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.options import AcquireOptions
+from stepdiag.acquisition.conductor import Conductor
+from stepdiag.acquisition.options import AcquireOptions, Resume
 from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
 from stepdiag.acquisition.raw_records import Header, Record
 from stepdiag.acquisition.reading_plan import channels_of_axes, check_axes, described_plan, digest_of
 from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Operator, Silent, Trigger
-from stepdiag.acquisition.visit_loop import Acquisition, Resume
+from stepdiag.acquisition.visit_loop import Acquisition
 from stepdiag.instruments.ids3010 import Ids3010, parse_source
 from stepdiag.instruments.ids3010_instrument import Ids3010Instrument
 from stepdiag.instruments.instrument import Instrument, InstrumentError
 from stepdiag.instruments.line_instrument import line_instrument
 from stepdiag.io.data_files import write_measurement
 from stepdiag.io.whole_files import check_output
+from stepdiag.planning.measuring_time import times_of
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.known import Known
 from stepdiag.wrong_arguments import checked
@@ -58,6 +60,8 @@ def acquire(
     raw: Path | None = None,
     operator: Operator | None = None,
     temperatures: Path | None = None,
+    watched: bool = False,
+    after_visit: Callable[[], None] | None = None,
 ) -> Acquired:
     """Acquire the readings of a scenario's plan from an instrument and write the measurement.
 
@@ -76,6 +80,8 @@ def acquire(
         raw: the raw file; None: `raw_path(output)`.
         operator: receives messages and confirms; None: messages are dropped.
         temperatures: CSV file that another program appends temperatures to (docs/acquisition.md).
+        watched: publish what happens beside the raw file, and do what watchers want (docs/acquisition.md).
+        after_visit: called when a line has been read and `output` has it.
 
     Raises:
         InvalidArgument: an option, the head or a file does not suit, or a file exists that would be
@@ -103,7 +109,11 @@ def acquire(
                 plan=plan,
             )
             file, content = opened.enter_context(_opened(path, header, resume, instrument))
-            work = Acquisition(known, header, file, instrument, trigger, operator, options, followed)
+            conductor = opened.enter_context(Conductor(instrument, operator, path if watched else None, options.sign))
+            work = Acquisition(known, header, file, instrument, trigger, conductor, options, followed)
+            conductor.state.visits, conductor.state.planned = len(plan), sum(len(visit.points) for visit in plan)
+            conductor.set_ups = plan[-1].set_up
+            conductor.set_up_seconds = times_of(known.keys.plan_by_time, f"{known.path}: plan_by_time").line_change
             if content is not None:
                 work.go_on(content, resume or "point")
 
@@ -117,6 +127,8 @@ def acquire(
                     temperature_age=options.temperature_age,
                 )
                 write_measurement(run, output)
+                if after_visit is not None:
+                    after_visit()
 
             try:
                 work.run(source, write)
@@ -125,6 +137,7 @@ def acquire(
                 raise
             finally:
                 if work.done:
+                    after_visit = None
                     write()
     finally:
         trigger.close()

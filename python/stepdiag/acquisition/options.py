@@ -8,6 +8,8 @@ from stepdiag.acquisition.run_from_raw import TEMPERATURE_AGE, Zero
 from stepdiag.acquisition.settling import Settling
 from stepdiag.option_field import option
 
+Resume = Literal["point", "line", "set-up"]  # what is read next, or once more
+
 
 def axes_of(text: str) -> tuple[int, ...]:
     """Axes from their numbers with commas between them. Raises InvalidArgument."""

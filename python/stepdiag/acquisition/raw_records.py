@@ -18,7 +18,7 @@ from stepdiag.acquisition.settling import ValueKind
 from stepdiag.config.key_types import Section, Triple
 from stepdiag.instruments.instrument import Number, ReadColumn
 
-LATEST: Final = 2  # version of the format
+LATEST: Final = 3  # version of the format
 LARGEST: Final = 2**63  # pm; 9 km
 
 
@@ -69,7 +69,7 @@ class Header(Section):
 
     record: Literal["header"] = "header"
     format: Literal["stepdiag raw readings"] = "stepdiag raw readings"
-    version: Literal[1, 2] = LATEST
+    version: Literal[1, 2, 3] = LATEST
     created: AwareDatetime
     scenario: str
     digest: str  # of channels and plan, see digest_of
@@ -81,7 +81,7 @@ class Header(Section):
 
     @model_validator(mode="after")
     def _has_columns(self) -> Self:
-        for name in self.columns if self.version == 2 else ():
+        for name in self.columns if self.version > 1 else ():
             ReadColumn.of(name)
         return self
 
@@ -117,6 +117,16 @@ class Again(Section):
     record: Literal["again"] = "again"
     time: AwareDatetime
     visit: Count
+
+
+class Remark(Section):
+    """What a person says, and the point that was read or waited for then."""
+
+    record: Literal["remark"] = "remark"
+    time: AwareDatetime
+    visit: Count
+    point: Count
+    text: str
 
 
 class TemperatureRow(Section):
@@ -167,7 +177,9 @@ class RawReading(Point):
         return None in self.read
 
 
-Record = Annotated[Header | Session | Again | TemperatureRow | Value | RawReading, Field(discriminator="record")]
+Record = Annotated[
+    Header | Session | Again | Remark | TemperatureRow | Value | RawReading, Field(discriminator="record")
+]
 _RECORD: TypeAdapter[Record] = TypeAdapter(Record)
 
 

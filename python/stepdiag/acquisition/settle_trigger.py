@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Final, NoReturn
 
 from stepdiag.acquisition.settling import Reading, Settling, spread
-from stepdiag.acquisition.triggers import Context, Missed, Seldom, Stopped, keeps, of_start, point_text
+from stepdiag.acquisition.triggers import Context, Missed, Seldom, Stopped, keeps, of_start, place_text, point_text
 from stepdiag.instruments.instrument import ReadColumn, Row, change_of_distance
 from stepdiag.scenario.order_of_run import Visit
 
@@ -34,6 +34,7 @@ class SettleTrigger:
         self._context: Context | None = None
         self._set_up = 0
         self._last: Row | None = None  # the last point read in this set-up
+        self._before: tuple[Row | None, float] = (None, 0.0)  # the one before it, and its nominal distance
         self._is_asked = False  # the operator has just asked for a reading
         self._last_nominal = 0.0
         self._nominal = 0.0  # distance at the point being read
@@ -49,14 +50,18 @@ class SettleTrigger:
         operator = of_start(self._context).operator
         operator.tell(text)
         if visit.set_up != self._set_up:
-            operator.confirm(f"read {point_text(visit, index)}, then move on")
+            operator.confirm(
+                f"set-up {visit.set_up}, line {visit.line}: aligned, and at rest at {place_text(visit, index)}? "
+                "Confirm, then start the machine"
+            )
             self._last, self._is_asked = None, True
         self._set_up = visit.set_up
 
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         self._rest = None
         if self._last is None and not self._is_asked:  # no reading to start from
-            of_start(self._context).operator.confirm(f"the last reading was lost: read {point_text(visit, index)}")
+            operator = of_start(self._context).operator
+            operator.confirm(f"no reading to go on from: at rest at {point_text(visit, index)}?")
         self._is_asked = False
         is_next = self._last is None or self._await(self._last, visit, index, nominal)
         self._nominal = nominal[index] if is_next else self._last_nominal
@@ -109,6 +114,9 @@ class SettleTrigger:
                     wanted = point_text(visit, index)
                     context.operator.tell(f"the mirror stays at the last point since {STAYS:g} s; waiting for {wanted}")
             was_away = was_away or (moved is not None and abs(moved) > AWAY)
+            paused = context.idle()
+            deadline += paused
+            began += paused
             time.sleep(max(context.settling.interval, 0.001))
         raise Stopped(f"{point_text(visit, index)}: the mirror did not arrive within {context.wait_timeout:g} s")
 
@@ -140,7 +148,17 @@ class SettleTrigger:
         columns = of_start(self._context).columns
         self._is_newest = change_of_distance(columns, row, row) is not None
         if self._is_newest:  # else the step starts earlier
+            self._before = (self._last, self._last_nominal)
             self._last, self._last_nominal, self._missed = row, self._nominal, 0
+
+    def go_back(self, *, whole_line: bool) -> None:
+        """A point that is lost is waited for as before. Before one that was read stands the one before it."""
+        if whole_line:
+            self._last, self._set_up, self._before = None, 0, (None, 0.0)
+        elif self._is_newest:
+            self._last, self._last_nominal = self._before
+            self._before = (None, 0.0)
+        self._is_newest = False
 
     def failed(self, why: str) -> None:
         pass

@@ -26,6 +26,7 @@ class TcpTrigger:
     LONGEST: Final = 256  # bytes per line
     CLIENTS: Final = 4  # at once: one controller, and those that come back before their old connection is gone
     WRONG: Final = 100  # requests in a row, after which a client is hung up on
+    IDLE: Final = 0.02  # s between looks at other things while it waits
     NO_FILES: Final = 0.2  # s until the next try to accept, where no more files may be open
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
@@ -57,8 +58,9 @@ class TcpTrigger:
         expected = (visit.number, int(visit.points[index]))
         deadline = time.monotonic() + context.wait_timeout
         while (left := deadline - time.monotonic()) > 0.0:
-            asked = self._next_line(left)
+            asked = self._next_line(min(left, self.IDLE))
             if asked is None:
+                deadline += context.idle()
                 continue
             client, line = asked
             wanted = _wanted(line)
@@ -74,6 +76,11 @@ class TcpTrigger:
                 self._answer(client, f"FAIL {self.WRONG} wrong requests in a row")
                 self._drop(client)
         raise Stopped(f"{point_text(visit, index)}: no request within {context.wait_timeout:g} s")
+
+    def go_back(self, *, whole_line: bool) -> None:
+        if not whole_line:
+            raise InvalidArgument("the controller's program does not go back to a point: repeat the line")
+        self._last = None
 
     def doubt(self, reading: Reading) -> str | None:
         return None  # a controller waits for its answer

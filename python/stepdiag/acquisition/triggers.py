@@ -81,6 +81,8 @@ class Context:
     sign: int
     operator: Operator
     last: tuple[int, int] | None = None  # visit and point of the last reading
+    # Called again and again while a trigger waits; returns seconds for which the acquisition was paused.
+    idle: Callable[[], float] = lambda: 0.0
 
     def change(self, row: Row, last: Row) -> float | None:
         """Change of the distance, mm: mean over the beams present in both rows."""
@@ -108,6 +110,10 @@ class Trigger(Protocol):
     def stored(self, visit: Visit, index: int, row: Row) -> None:
         """Called when the reading is on the disk."""
 
+    def go_back(self, *, whole_line: bool) -> None:
+        """Called where the last point, or a whole line, is to be read once more. Raises InvalidArgument where whoever
+        moves the machine does not go back."""
+
     def failed(self, why: str) -> None:
         """Called when the reading failed and the acquisition stops."""
 
@@ -129,6 +135,9 @@ class KeyTrigger:
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         of_start(self.context).operator.confirm(f"read {point_text(visit, index)}")
         return True
+
+    def go_back(self, *, whole_line: bool) -> None:
+        pass
 
     def doubt(self, reading: Reading) -> str | None:
         return None
@@ -154,11 +163,13 @@ def keeps(context: Context | None, text: str) -> bool:
 
 def point_text(visit: Visit, index: int) -> str:
     """Text for a point: visit, line, run, direction, number and commanded position."""
+    return f"visit {visit.number} (line {visit.line}, run {visit.run}, {visit.direction}), {place_text(visit, index)}"
+
+
+def place_text(visit: Visit, index: int) -> str:
+    """Text for a place of the axes: the point's number and commanded position."""
     x, y, z = (float(p) for p in visit.positions[index])
-    return (
-        f"visit {visit.number} (line {visit.line}, run {visit.run}, {visit.direction}), "
-        f"point {int(visit.points[index])} at X{x:g} Y{y:g} Z{z:g}"
-    )
+    return f"point {int(visit.points[index])} at X{x:g} Y{y:g} Z{z:g}"
 
 
 def of_start(context: Context | None) -> Context:

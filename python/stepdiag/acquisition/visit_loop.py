@@ -1,26 +1,25 @@
 """The loop of an acquisition over visits and points."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from typing import Literal
 
 import numpy as np
 
-from stepdiag._core import __version__
-from stepdiag.acquisition.options import AcquireOptions
+from stepdiag._core import InvalidArgument, __version__
+from stepdiag.acquisition.conductor import Conductor, Wanted
+from stepdiag.acquisition.options import AcquireOptions, Resume
 from stepdiag.acquisition.point_check import PointCheck
 from stepdiag.acquisition.raw_file import RawContent, RawFile
-from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, TemperatureRow, Value
+from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Remark, Session, TemperatureRow, Value
 from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.temperature_file import TemperatureFile
-from stepdiag.acquisition.triggers import Context, Missed, Operator, Trigger, point_text
+from stepdiag.acquisition.triggers import Context, Missed, Trigger, point_text
 from stepdiag.instruments.instrument import Instrument, Row, mean_distance
 from stepdiag.mistakes.nominal_way import Way, line_remark
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
-
-Resume = Literal["point", "line", "set-up"]
 
 
 class Acquisition:
@@ -35,18 +34,20 @@ class Acquisition:
         file: RawFile,
         instrument: Instrument,
         trigger: Trigger,
-        operator: Operator,
+        conductor: Conductor,
         options: AcquireOptions,
         temperatures: TemperatureFile | None = None,
     ) -> None:
         self._known, self._header, self._options = known, header, options
         self._file, self._instrument = file, instrument
-        self._trigger, self._operator = trigger, operator
+        self._trigger, self._operator = trigger, conductor
+        conductor.remark = self._remember
         self._temperatures = temperatures
         self._visits = list(visits_of(known))
         self._set_up = 0  # the last set-up for which the instrument was ready
         self._visit = 0  # visit of the last reading
         self._check = PointCheck(known, instrument.columns, header.sign)
+        self._once_more: set[tuple[int, int]] = set()  # readings that are read again
         self.done: dict[tuple[int, int], RawReading] = {}
         self.recorded: list[TemperatureRow] = []
 
@@ -62,20 +63,24 @@ class Acquisition:
             self._operator.tell(
                 "warning: the readings so far have temperatures; without `temperatures` others have none"
             )
-        if resume == "point" or not self.done:
-            return
+        if resume != "point" and self.done:
+            self._leave_out(resume)
+
+    def _leave_out(self, resume: Resume) -> None:
+        """The last line or set-up counts no more."""
         last, _ = next(reversed(self.done))
         set_up = self._visits[last - 1].set_up
         first = last if resume == "line" else min(visit.number for visit in self._visits if visit.set_up == set_up)
         self._file.append([Again(time=datetime.now(UTC), visit=first)])
         self.done = {key: reading for key, reading in self.done.items() if key[0] < first}
+        self._once_more.clear()
 
     def run(self, source: str, write: Callable[[], None]) -> None:
         """Read the remaining points. Calls `write` after every visit."""
         for number, point in self.done:  # what a set-up that is taken up again is compared with
             visit = self._visits[number - 1]
             self._check.look(visit, visit.points.tolist().index(point), tuple(self.done[number, point].read))
-        remaining = list(self._remaining())
+        remaining = deque(self._remaining())
         if not remaining:
             self._operator.tell("all points of the plan have been read")
             return
@@ -88,26 +93,27 @@ class Acquisition:
         last = next(reversed(self.done), None)
         self._trigger.start(
             Context(
-                self._instrument.read,
+                self._operator.read,
                 self._instrument.columns,
                 options.settling,
                 options.wait_timeout,
                 options.sign,
                 self._operator,
                 last,
+                self._operator.idle,
             )
         )
         begun = 0
-        for visit, index in remaining:
-            if visit.number != begun:
-                self._trigger.begin(visit, index, self._instruction(visit, begun))
-            begun = visit.number
+        while remaining:
+            visit, index = remaining[0]
             try:
-                while not self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm):
-                    self._take(*self._last_taken(), once_more=True)
-                self._take(visit, index)
-            except Missed as missed:
-                self._store(visit, index, self._lost(str(missed)))
+                begun = self._read_next(visit, index, begun)
+            except Wanted as wanted:
+                if self._go_back(wanted.again):
+                    begun = begun if wanted.again == "point" else 0
+                    remaining = deque(self._remaining())
+                continue
+            remaining.popleft()
             if index + 1 == len(visit.points):
                 if rows := self._new_temperatures():
                     self._file.append(rows)
@@ -117,10 +123,51 @@ class Acquisition:
                 if remark is not None:
                     self._operator.tell(f"warning: line {visit.line}: {remark}")
 
+    def _read_next(self, visit: Visit, index: int, begun: int) -> int:
+        """Returns the visit that is begun now; `begun`: that before."""
+        nominal = self._header.plan[visit.number - 1].nominal_mm
+        self._operator.at(visit, index, nominal[index])
+        if visit.number != begun:
+            self._trigger.begin(visit, index, self._instruction(visit, begun))
+        key = (visit.number, int(visit.points[index]))
+        try:
+            while not self._trigger.wait(visit, index, nominal):
+                self._take(*self._last_taken(), once_more=True)
+            self._take(visit, index, once_more=key in self._once_more)
+        except Missed as missed:
+            self._store(visit, index, self._lost(str(missed)), once_more=key in self._once_more)
+        self._once_more.discard(key)
+        return visit.number
+
+    def _go_back(self, again: Resume) -> bool:
+        """A person wants something once more. False: there is nothing, or it cannot be had."""
+        if not self.done:
+            self._operator.tell("nothing was read yet that could be read once more")
+            return False
+        try:
+            self._trigger.go_back(whole_line=again != "point")
+        except InvalidArgument as error:
+            self._operator.tell(str(error))
+            return False
+        visit, index = self._last_taken()
+        if again == "point":
+            self._once_more.add((visit.number, int(visit.points[index])))
+            self._operator.tell(f"once more: {point_text(visit, index)}")
+            return True
+        self._leave_out(again)
+        self._operator.tell(f"once more: {again} {visit.line if again == 'line' else visit.set_up}, from its beginning")
+        return True
+
+    def _remember(self, text: str) -> None:
+        """A remark of a person, at the point that is read or waited for."""
+        state = self._operator.state
+        self._file.append([Remark(time=datetime.now(UTC), visit=state.visit, point=state.point, text=text)])
+
     def _remaining(self) -> Iterator[tuple[Visit, int]]:
         for visit in self._visits:
             for index, point in enumerate(visit.points):
-                if (visit.number, int(point)) not in self.done:
+                key = (visit.number, int(point))
+                if key not in self.done or key in self._once_more:
                     yield visit, index
 
     def _instruction(self, visit: Visit, last: int) -> str:
@@ -156,7 +203,8 @@ class Acquisition:
             self._instrument.make_ready(is_begun, self._operator.tell)
             self._set_up = visit.set_up
         columns = self._instrument.columns
-        reading = take_reading(self._instrument.read, columns, self._options.settling)
+        self._operator.doing("reads")
+        reading = take_reading(self._operator.read, columns, self._options.settling)
         doubt = self._trigger.doubt(reading)
         if doubt is not None:
             reading.lost = dict.fromkeys(range(len(columns)), doubt)
@@ -177,6 +225,9 @@ class Acquisition:
             self._file.append([*values, stored])
             self.done.pop(key, None)
             self.done[key] = stored
+        nominal = self._header.plan[visit.number - 1].nominal_mm[index]
+        lost = sum(1 for reading in self.done.values() if reading.is_lost)
+        self._operator.stored(self.done[key], nominal, len(self.done), lost)
         return tuple(self.done[key].read)
 
     def _new_temperatures(self) -> list[TemperatureRow]:

@@ -5,8 +5,8 @@ Instruments: ids3010_instrument.py (attocube IDS3010), line_instrument.py (anyth
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 from fractions import Fraction
@@ -96,6 +96,7 @@ class Sample:
     values: Row
     reasons: tuple[str, ...]  # "" where there is a value
     time: datetime | None = None  # when it was taken, where the instrument tells
+    signal: Mapping[str, float] = field(default_factory=dict)  # how much light comes back, as far as it is told
 
     @property
     def is_whole(self) -> bool:

@@ -15,7 +15,7 @@ from stepdiag.acquisition.acquire import Acquired, acquire
 from stepdiag.acquisition.point_check import MOST, PointCheck
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.triggers import KeyTrigger
-from stepdiag.cli.acquire import _Terminal
+from stepdiag.cli.at_machine.operators import Terminal
 from stepdiag.instruments.instrument import columns_of_signals
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import Scenario, parse_scenario, simulate_scenario
@@ -235,7 +235,7 @@ def test_operator_at_the_terminal_is_asked(
             return lines.pop(0)
 
     monkeypatch.setattr(sys, "stdin", Typing())
-    assert _Terminal().repeats("point 3: odd") == repeats
+    assert Terminal().repeats("point 3: odd") == repeats
     out = capsys.readouterr().out
     assert out.startswith("warning: point 3: odd\nrepeat [r], keep [k]: ")
     assert not lines
@@ -247,5 +247,5 @@ def test_nobody_at_the_terminal_keeps(monkeypatch: pytest.MonkeyPatch, capsys: p
             return False
 
     monkeypatch.setattr(sys, "stdin", Piped())
-    assert not _Terminal().repeats("point 3: odd")
+    assert not Terminal().repeats("point 3: odd")
     assert capsys.readouterr().out == "warning: point 3: odd\n"

@@ -81,7 +81,9 @@ def test_rest_a_step_further_is_the_next_point(sign: int) -> None:
     followed.begin()
     assert followed.wait(1)
     assert followed.last == (1.02, 1.02, 1.02)
-    assert followed.operator.asked == ["read visit 1 (line ppp, run 0, forward), point 0 at X0 Y0 Z0, then move on"]
+    assert followed.operator.asked == [
+        "set-up 1, line ppp: aligned, and at rest at point 0 at X0 Y0 Z0? Confirm, then start the machine"
+    ]
 
 
 def test_moving_mirror_is_not_read_on_its_way() -> None:
@@ -260,7 +262,7 @@ def test_after_a_lost_beginning_the_operator_is_asked_again() -> None:
     followed.begin(distance=None)
     assert followed.wait(1)
     followed.stored(1.0)
-    assert [text.partition(":")[0] for text in followed.operator.asked[1:]] == ["the last reading was lost"]
+    assert [text.partition(":")[0] for text in followed.operator.asked[1:]] == ["no reading to go on from"]
 
 
 def test_reading_of_a_mirror_that_moved_on_is_doubted() -> None:

@@ -22,7 +22,9 @@ def imported_of(modules: str, *arguments: str | Path) -> str:
 
 
 def test_help_imports_neither_numpy_nor_a_command() -> None:
-    modules = "numpy pydantic tomllib hashlib stepdiag.cli.evaluate stepdiag.cli.options stepdiag.cli.acquire"
+    modules = (
+        "numpy pydantic tomllib hashlib stepdiag.cli.evaluate stepdiag.cli.options stepdiag.cli.at_machine.acquire"
+    )
     assert imported_of(modules, "--help") == ""
 
 
@@ -31,6 +33,6 @@ def test_evaluating_to_csv_imports_no_netcdf_and_no_search_that_is_not_made(tmp_
     sd.simulate(sd.read_scenario(scenario)).write(run)
     modules = (
         "netCDF4 xarray pandas matplotlib numpy.ma concurrent.futures tqdm "
-        "stepdiag.head.description stepdiag.presentation.objects.evaluation stepdiag.cli.acquire"
+        "stepdiag.head.description stepdiag.presentation.objects.evaluation stepdiag.cli.at_machine.acquire"
     )
     assert imported_of(modules, "evaluate", scenario, run, "-o", tmp_path / "calibration.csv") == ""

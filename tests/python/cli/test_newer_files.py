@@ -45,7 +45,7 @@ def in_first_line(path: Path) -> None:
 
 
 def in_header(path: Path) -> None:
-    path.write_text('{"record":"header","format":"stepdiag raw readings","version":3,"not_yet_known":0}\n')
+    path.write_text('{"record":"header","format":"stepdiag raw readings","version":4,"not_yet_known":0}\n')
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             'u.nc: attribute format: expected "stepdiag uncertainty 1", got',
         ),
         ("u.nc", in_attribute, "report b.nc --uncertainty u.nc -o new.html", "u.nc: attribute format: expected"),
-        ("raw.jsonl", in_header, "check raw.jsonl", "raw.jsonl, line 1: version: expected 2 or less, got 3"),
+        ("raw.jsonl", in_header, "check raw.jsonl", "raw.jsonl, line 1: version: expected 3 or less, got 4"),
         (
             "saved.checkpoint",
             in_first_line,

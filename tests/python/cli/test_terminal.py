@@ -17,7 +17,7 @@ from terminals import needs_terminal
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.cli.acquire import acquire
+from stepdiag.cli.at_machine.acquire import acquire
 from stepdiag.cli.evaluate import evaluate
 from stepdiag.cli.options import Grouped
 from stepdiag.cli.terminal import LONGEST, WIDEST, say

@@ -8,46 +8,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.options import AcquireOptions
+from stepdiag.acquisition.options import AcquireOptions, Resume
 from stepdiag.acquisition.settling import Settling
+from stepdiag.cli.at_machine.operators import FitSoFar, Terminal, Watched
 from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.interrupts import unwinding
-from stepdiag.cli.options import PATH, Writes, in_flags, made_of, options_of, out_file, tell, tell_inputs
-from stepdiag.cli.terminal import plain
+from stepdiag.cli.options import PATH, Writes, made_of, options_of, out_file, tell, tell_inputs
 from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
 if TYPE_CHECKING:
     from stepdiag.acquisition.triggers import Trigger
-    from stepdiag.acquisition.visit_loop import Resume
     from stepdiag.twin.server import Twin
 
 SECONDS = click.FloatRange(min=0.0, min_open=True)
-
-
-class _Terminal:
-    """The operator at the terminal."""
-
-    def tell(self, text: str) -> None:
-        click.echo(plain(in_flags(text)))
-
-    def confirm(self, text: str) -> None:
-        click.echo(f"{text}: Enter", nl=False)
-        sys.stdout.flush()
-        if not sys.stdin.readline():
-            raise InvalidArgument("standard input ended before Enter was pressed; --resume continues")
-
-    def repeats(self, text: str) -> bool:
-        self.tell(f"warning: {text}")
-        while sys.stdin.isatty():
-            click.echo("repeat [r], keep [k]: ", nl=False)
-            sys.stdout.flush()
-            answer = sys.stdin.readline()
-            if not answer:
-                raise InvalidArgument("standard input ended; --resume continues")
-            if answer.strip().lower() in ("r", "k"):
-                return answer.strip().lower() == "r"
-        return False  # nobody to ask
 
 
 @click.command(
@@ -62,7 +36,7 @@ class _Terminal:
         ],
         "Temperatures": ["temperatures", "temperature_age"],
         "Output": ["output", "uncertainties", "raw"],
-        "Continue": ["resume", "restart_line", "restart_set_up", "from_raw"],
+        "Continue": ["resume", "restart_line", "restart_set_up", "from_raw", "watched"],
     },
     epilog="\b\nExample: stepdiag acquire scenario.toml --source ids3010://192.168.1.1 -o run.csv",
 )
@@ -88,6 +62,9 @@ class _Terminal:
 )
 @click.option(
     "--raw", type=Writes(RAW), metavar="FILE", help="Raw file (.jsonl).  [default: beside the output, run.raw.jsonl]"
+)
+@click.option(
+    "--watched", is_flag=True, help="Questions are answered by whoever watches (stepdiag app), not at standard input."
 )
 @click.option("--resume", is_flag=True, help="Continue the raw file at the point where it stopped.")
 @click.option("--restart-line", is_flag=True, help="Continue the raw file, but read its last line again.")
@@ -134,6 +111,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     def continuation() -> str | None:
         return f"{raw.path} has the readings so far: repeat the command with --resume" if is_begun(raw.path) else None
 
+    fits = FitSoFar(scenario, path)
     with at_end(continuation), unwinding():
         result = acquire(
             described.known,
@@ -143,9 +121,12 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
             options=options,
             resume=resume,
             raw=raw.path,
-            operator=_Terminal(),
+            operator=Watched() if given["watched"] else Terminal(),
             temperatures=given["temperatures"],
+            watched=True,
+            after_visit=fits.begin,
         )
+    fits.end()
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
 
@@ -174,7 +155,7 @@ def _options(given: dict[str, Any]) -> AcquireOptions:
     return made_of(AcquireOptions, given, settling=made_of(Settling, given))
 
 
-def _resume(given: dict[str, Any]) -> "Resume | None":
+def _resume(given: dict[str, Any]) -> Resume | None:
     flags: dict[str, Resume] = {"resume": "point", "restart_line": "line", "restart_set_up": "set-up"}
     chosen = [way for flag, way in flags.items() if given[flag]]
     if len(chosen) > 1:

@@ -1,0 +1,205 @@
+"""The person whom an acquisition asks: at the terminal, or whoever watches it."""
+
+import os
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Final
+
+import click
+
+from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.control import Control
+from stepdiag.acquisition.live_state import LiveState
+from stepdiag.cli.options import in_flags
+from stepdiag.cli.terminal import plain
+
+BETWEEN_LINES: Final = 0.2  # s between two states on a terminal
+BAR: Final = 20  # columns
+_TOLD: Final = ("fit:", "rejected because", "doubtful because", "undetermined: scale", "undetermined: C0Y", "repeat")
+_KEYS: Final[dict[str, Control]] = {"r": "repeat_point", "k": "keep"}
+
+
+class Watched:
+    """Nobody at the terminal: questions are answered by whoever watches. What is told goes to standard output."""
+
+    def __init__(self) -> None:
+        self._stored = 0
+
+    def tell(self, text: str) -> None:
+        click.echo(plain(in_flags(text)))
+
+    def confirm(self, text: str) -> None:
+        raise InvalidArgument(f"{text}: nobody watches")
+
+    def repeats(self, text: str) -> bool:
+        return False
+
+    def ask(self, text: str, answers: list[Control]) -> None:
+        self.tell(text)
+
+    def answered(self) -> Control | None:
+        return None
+
+    def withdraw(self) -> None:
+        pass
+
+    def show(self, state: LiveState) -> None:
+        """A line a reading."""
+        if state.stored > self._stored:
+            self._stored = state.stored
+            click.echo(plain(state.last))
+
+
+class Terminal(Watched):
+    """The person at the terminal. What happens now stands in its last line."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._is_terminal = sys.stdout.isatty()
+        self._width = 0  # of the last line
+        self._shown = 0.0
+        self._line = 0  # a line's bar has been written for this visit
+        self._typed = b""
+        self._answers: list[Control] = []
+
+    def tell(self, text: str) -> None:
+        self._clear()
+        super().tell(text)
+
+    def confirm(self, text: str) -> None:
+        self.ask(text, ["confirm"])
+        while self.answered() is None:
+            time.sleep(BETWEEN_LINES / 10.0)
+
+    def repeats(self, text: str) -> bool:
+        self.ask(text, ["repeat_point", "keep"])
+        while (answer := self.answered()) is None:
+            time.sleep(BETWEEN_LINES / 10.0)
+        return answer == "repeat_point"
+
+    def ask(self, text: str, answers: list[Control]) -> None:
+        self._clear()
+        self._answers = answers
+        if answers == ["confirm"]:
+            click.echo(f"{plain(in_flags(text))}: Enter", nl=False)
+        else:
+            self.tell(f"warning: {text}")
+            if sys.stdin.isatty():
+                click.echo("repeat [r], keep [k]: ", nl=False)
+        sys.stdout.flush()
+
+    def answered(self) -> Control | None:
+        if self._answers != ["confirm"] and not sys.stdin.isatty():
+            return "keep"  # nobody to ask
+        line = self._typed_line()
+        if line is None:
+            return None
+        if not sys.stdin.isatty():
+            click.echo()  # a terminal shows the Enter itself
+        if self._answers == ["confirm"]:
+            return "confirm"
+        answer = _KEYS.get(line.strip().lower())
+        if answer is None:
+            click.echo("repeat [r], keep [k]: ", nl=False)
+            sys.stdout.flush()
+        return answer
+
+    def withdraw(self) -> None:
+        click.echo(" – answered elsewhere")
+
+    def show(self, state: LiveState) -> None:
+        if not self._is_terminal:
+            super().show(state)
+            return
+        now = time.monotonic()
+        if state.doing in ("asks", "ended") or now - self._shown < BETWEEN_LINES:
+            return
+        self._shown = now
+        text = plain(status_line(state))[: max(20, os.get_terminal_size().columns - 1)]
+        click.echo(f"\r{text.ljust(self._width)}", nl=False)
+        self._width = len(text)
+        sys.stdout.flush()
+
+    def _clear(self) -> None:
+        if self._width:
+            click.echo("\r" + " " * self._width + "\r", nl=False)
+            self._width = 0
+
+    def _typed_line(self) -> str | None:
+        """A line that was typed, if it is whole. Raises InvalidArgument at the end of standard input."""
+        ended = "standard input ended before Enter was pressed; --resume continues"
+        try:
+            number = sys.stdin.fileno()
+        except (OSError, ValueError):  # no file, such as in a notebook
+            line = sys.stdin.readline()
+            if not line:
+                raise InvalidArgument(ended) from None
+            return line
+        if b"\n" not in self._typed and select.select([number], [], [], 0.0)[0]:
+            data = os.read(number, 4096)
+            if not data:
+                raise InvalidArgument(ended)
+            self._typed += data
+        line, end, rest = self._typed.partition(b"\n")
+        if not end:
+            return None
+        self._typed = rest
+        return line.decode(errors="replace")
+
+
+def status_line(state: LiveState) -> str:
+    """What happens, in one line."""
+    done = round(BAR * (state.index + (state.doing == "reads")) / max(state.points, 1))
+    bar = "█" * done + "·" * (BAR - done)
+    if state.reasons:
+        beside = f"NO BEAM ({state.reasons[0]})" if state.distance_mm is None else state.reasons[0]
+    elif state.from_nominal_um is not None and abs(state.from_nominal_um) < 1e4:
+        beside = f"{state.from_nominal_um:+9.3f} µm from nominal"
+    else:
+        beside = "" if state.distance_mm is None else f"{state.distance_mm:.4f} mm"
+    left = "" if state.minutes_left is None else f", {state.minutes_left:.0f} min left"
+    lost = f", {state.lost} lost" if state.lost else ""
+    return (
+        f"{state.line} {bar} point {state.point} {state.doing} {beside} | {state.readings} of {state.planned} "
+        f"readings{lost}{left}"
+    )
+
+
+class FitSoFar:
+    """Evaluates the readings after each line, in a process of its own, and says what came of it."""
+
+    def __init__(self, scenario: Path, run: Path) -> None:
+        self._scenario, self._run = scenario, run
+        self._process: subprocess.Popen[str] | None = None
+        self._is_behind = False  # readings have come since it began
+
+    def begin(self) -> None:
+        """Say what came of the last one, and begin another; while it runs, no third."""
+        self._is_behind = self._process is not None and self._process.poll() is None
+        if self._is_behind:
+            return
+        self._tell()
+        command = [sys.executable, "-m", "stepdiag", "evaluate", str(self._scenario), str(self._run)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def end(self) -> None:
+        """Say what came of all readings."""
+        self._tell()
+        if self._is_behind:
+            self.begin()
+            self._tell()
+
+    def _tell(self) -> None:
+        if self._process is None:
+            return
+        said, wrong = self._process.communicate()
+        status, self._process = self._process.returncode, None
+        found = said.splitlines() if status in (0, 3) else wrong.splitlines()[-1:]
+        for line in found:
+            if status not in (0, 3) or line.startswith(_TOLD):
+                click.echo(plain(f"so far: {line}"))
