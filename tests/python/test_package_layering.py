@@ -39,6 +39,7 @@ BELOW: dict[str, set[str]] = {
     "rechecking": {"scenario"},
     "instruments": {"scenario"},
     "acquisition": {"instruments", "mistakes", "planning", "option_field"},
+    "alignment": {"acquisition"},
     "twin": {"acquisition"},
     "linuxcnc": set(),
     "figures": {"planning"},

@@ -62,10 +62,13 @@ class Conductor:
         """raw: the raw file beside which it publishes; None: nobody watches."""
         self.state = LiveState()
         self._instrument, self._operator, self._raw, self._sign = instrument, operator, raw, sign
-        self._asking = operator if raw is not None and isinstance(operator, AskingOperator) else None
+        self._asking = operator if isinstance(operator, AskingOperator) else None
+        self._is_followed = raw is not None or self._asking is not None
         self._live: LiveFile | None = None
         self._control: ControlFile | None = None
         self.remark: Callable[[str], None] = lambda _: None
+        self.cross: Callable[[Sample], tuple[float, float] | None] = lambda _: None
+        self.source = instrument.read  # of samples
         self._published = self._looked = self._tried = 0.0
         self._asked = 0
         self._nominal = 0.0  # distance at the point that is read or waited for, mm
@@ -87,7 +90,7 @@ class Conductor:
     # --- the instrument ---
     def read(self) -> Sample:
         """A sample, which is published."""
-        sample = self._instrument.read()
+        sample = self.source()
         self._publish_sample(sample)
         return sample
 
@@ -108,10 +111,10 @@ class Conductor:
     def _show(self) -> None:
         """Also where nobody reads now: the distance lives on the screen while the machine moves."""
         now = time.monotonic()
-        if self._live is None or now - self._published < BETWEEN_STATES or now < self._tried:
+        if not self._is_followed or now - self._published < BETWEEN_STATES or now < self._tried:
             return
         try:
-            self._publish_sample(self._instrument.read())
+            self._publish_sample(self.source())
         except InstrumentError as error:
             self._tried = now + BETWEEN_TRIES
             self.state.values, self.state.reasons = {}, [str(error)]
@@ -227,7 +230,7 @@ class Conductor:
         self._publish()
 
     def _publish_sample(self, sample: Sample) -> None:
-        if self._live is None or time.monotonic() - self._published < BETWEEN_STATES:
+        if not self._is_followed or time.monotonic() - self._published < BETWEEN_STATES:
             return
         state = self.state
         state.values = {
@@ -237,6 +240,8 @@ class Conductor:
         state.reasons = list(dict.fromkeys(reason for reason in sample.reasons if reason))
         state.signal = dict(sample.signal)
         state.at = (sample.time or datetime.now(UTC)).timestamp()
+        cross = self.cross(sample)
+        state.cross_urad = None if cross is None else list(cross)
         distance = self._distance(sample.values)
         state.distance_mm = distance
         if distance is None or self._offset is None:
@@ -250,9 +255,8 @@ class Conductor:
         return None if distance != distance else distance
 
     def _publish(self) -> None:
-        if self._live is None:
-            return
         self._published = time.monotonic()
-        self._live.publish(self.state)
+        if self._live is not None:
+            self._live.publish(self.state)
         if self._asking is not None:
             self._asking.show(self.state)

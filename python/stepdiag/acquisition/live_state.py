@@ -50,6 +50,10 @@ class LiveState:
     values: dict[str, float | None] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)  # why values are missing
     signal: dict[str, float] = field(default_factory=dict)
+    cross_urad: list[float] | None = None  # the mirror against the beam, see cross.py
+    limit_urad: float | None = None  # of that, while head and mirror are aligned
+    turns: list[str] = field(default_factory=list)  # what to turn, while they are aligned
+    is_aligned: bool = False
     from_nominal_um: float | None = None
     distance_mm: float | None = None
     readings: int = 0

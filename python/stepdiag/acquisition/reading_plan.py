@@ -2,9 +2,6 @@
 
 import hashlib
 from collections.abc import Sequence
-from typing import Any
-
-import numpy as np
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.raw_records import Visited
@@ -70,19 +67,3 @@ def digest_of(channels: Sequence[str], plan: Sequence[Visited]) -> str:
     """Digest of everything that must be unchanged for an acquisition to be resumed."""
     text = ",".join(channels) + "".join(visit.model_dump_json() for visit in plan)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def placement(known: Known, visit: Visit) -> str:
-    """Text with the positions of head and mirror for a visit's line, in the machine frame."""
-    first = known.plan.points(visit.line, visit.run)[0] + np.array(known.tool)
-    along = known.plan.frame(visit.line)[:, 2]
-    origin = first - known.heads[visit.line].standoff * along
-    kind = "scale line" if visit.is_scale_line else "line"
-    return (
-        f"set-up {visit.set_up}, {kind} {visit.line}: beam from ({_numbers(origin, 2)}) mm along "
-        f"({_numbers(along, 6)}), mirror on the tool across it, which starts at ({_numbers(first, 2)}) mm"
-    )
-
-
-def _numbers(vector: Any, digits: int) -> str:
-    return ", ".join(f"{float(x) + 0.0:.{digits}f}" for x in vector)

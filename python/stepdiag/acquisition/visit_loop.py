@@ -8,11 +8,12 @@ import numpy as np
 
 from stepdiag._core import InvalidArgument, __version__
 from stepdiag.acquisition.conductor import Conductor, Wanted
+from stepdiag.acquisition.cross import cross_of
 from stepdiag.acquisition.options import AcquireOptions, Resume
+from stepdiag.acquisition.placement import placement
 from stepdiag.acquisition.point_check import PointCheck
 from stepdiag.acquisition.raw_file import RawContent, RawFile
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Remark, Session, TemperatureRow, Value
-from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Context, Missed, Trigger, point_text
@@ -127,6 +128,9 @@ class Acquisition:
         """Returns the visit that is begun now; `begun`: that before."""
         nominal = self._header.plan[visit.number - 1].nominal_mm
         self._operator.at(visit, index, nominal[index])
+        head, frame = self._known.heads[visit.line], np.asarray(self._known.plan.frame(visit.line))
+        columns, sign = self._instrument.columns, self._header.sign
+        self._operator.cross = lambda sample: cross_of(head, frame, columns, sample.values, sign)
         if visit.number != begun:
             self._trigger.begin(visit, index, self._instruction(visit, begun))
         key = (visit.number, int(visit.points[index]))
@@ -173,7 +177,7 @@ class Acquisition:
     def _instruction(self, visit: Visit, last: int) -> str:
         if last and self._visits[last - 1].set_up == visit.set_up:
             return f"set-up {visit.set_up} stays as it is: run {visit.run}, {visit.direction}"
-        return placement(self._known, visit)
+        return placement(self._known, visit).words
 
     def _last_taken(self) -> tuple[Visit, int]:
         number, point = next(reversed(self.done))

@@ -24,7 +24,6 @@ _RADIUS: Final = 11.0  # of the circle of a head
 _AWAY: Final = np.array([0.42, -0.30])  # where a length along Y goes, right and down
 _MOST_POINTS: Final = 20_000  # that a dry run carries to the page
 _SMALLEST: Final = 0.05  # mirror and head as drawn, by the longest edge of the volume
-_WORDS: Final = (("left", "right"), ("front", "back"), ("low", "high"))
 
 
 @dataclass(frozen=True)
@@ -52,11 +51,6 @@ def planned_lines(known: Known) -> list[PlannedLine]:
             head = visit.positions[0] - known.heads[visit.line].standoff * frame[:, 2]
             found.append(PlannedLine(visit.set_up, visit.line, visit.is_scale_line, visit, passes, head, frame))
     return found
-
-
-def place_words(point: FloatArray, volume: FloatArray) -> str:
-    """The corner of the volume that is nearest, such as "front left low"."""
-    return " ".join(_WORDS[axis][int(point[axis] > volume[axis] / 2.0)] for axis in (1, 0, 2))
 
 
 class MachineDrawing:

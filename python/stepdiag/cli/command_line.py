@@ -33,6 +33,7 @@ COMMANDS: Final = {
     "uncertainty": ("uncertainty", "Report how uncertain a calibration would be."),
     "study": ("study", "Report the uncertainty over a grid of scenarios."),
     "nc": ("export", "Write the measuring program for a controller."),
+    "align": ("at_machine.align", "Align head and mirror of each line."),
     "acquire": ("at_machine.acquire", "Record readings from an instrument."),
     "twin": ("at_machine.acquire", "Simulate the instrument."),
     "import": ("files", "Read a measurement from a spreadsheet."),

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import Field, fields
 from pathlib import Path
 from types import NoneType, UnionType
@@ -63,13 +63,13 @@ def out_file(meaning: str, *kinds: FileKind) -> Callable[[Command], Command]:
 
 
 # --- options from the fields of an option class (option_field.py) ---
-def options_of(*classes: type) -> Callable[[Command], Command]:
-    """Decorator of a command: an option for each field with a meaning."""
+def options_of(*classes: type, only: Collection[str] = ()) -> Callable[[Command], Command]:
+    """Decorator of a command: an option for each field with a meaning, or for these alone."""
 
     def decorate(command: Command) -> Command:
         for kind in reversed(classes):
             types = get_type_hints(kind)
-            for field in reversed(list(_described(kind))):
+            for field in reversed([one for one in _described(kind) if not only or one.name in only]):
                 command = _option(field, types[field.name])(command)
         return command
 
@@ -77,8 +77,8 @@ def options_of(*classes: type) -> Callable[[Command], Command]:
 
 
 def made_of(kind: type[Options], given: dict[str, Any], **others: Any) -> Options:
-    """The class from the options of a command, and from other fields."""
-    values = {field.name: _value(field, given[_name(field)]) for field in _described(kind)}
+    """The class from the options of a command, as far as it has them, and from other fields."""
+    values = {field.name: _value(field, given[_name(field)]) for field in _described(kind) if _name(field) in given}
     return kind(**values, **others)
 
 

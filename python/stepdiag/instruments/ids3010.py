@@ -20,6 +20,7 @@ PORT: Final = 9090
 AXES: Final = 3
 RUNNING: Final = "measurement running"
 IDLE: Final = "system idle"
+ALIGNING: Final = "optics alignment running"
 STARTING: Final = ("measurement starting", "measurement restarting")
 TWIN: Final = "stepdiag twin"  # device type that a twin reports
 # Prefix of the functions' names: the first up to firmware 1.8, the second in 1.9.1.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Literal, Self
 
-from stepdiag.instruments.ids3010 import RUNNING, STARTING, TWIN, Ids3010
+from stepdiag.instruments.ids3010 import ALIGNING, IDLE, RUNNING, STARTING, TWIN, Ids3010
 from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Sample
 
 
@@ -50,6 +50,38 @@ class Ids3010Instrument:
     def visit(self, number: int, index: int, digest: str) -> None:
         if self._is_twin:
             self._client.ask("stepdiag.twin.visit", [number, index, digest])
+
+    def set_up(self, number: int) -> None:
+        if self._is_twin:
+            self._client.ask("stepdiag.twin.setUp", [number])
+
+    def go_to(self, position: Sequence[float]) -> bool:
+        if self._is_twin:
+            self._client.ask("stepdiag.twin.moveTo", list(position))
+        return self._is_twin
+
+    has_optics_alignment = True
+
+    def optics_alignment(self, is_on: bool) -> None:
+        client = self._client
+        if is_on and client.mode() != ALIGNING:
+            if client.mode() == RUNNING:
+                client.ask("system.stopMeasurement")
+                client.wait_for(IDLE, self._start_timeout)
+            client.ask("system.startOpticsAlignment")
+            client.wait_for(ALIGNING, self._start_timeout)
+        elif not is_on and client.mode() == ALIGNING:
+            client.ask("system.stopOpticsAlignment")
+            client.wait_for(IDLE, self._start_timeout)
+
+    def signal(self) -> Sample:
+        shown: dict[str, float] = {}
+        for column, axis in zip(self.columns, self.axes, strict=True):
+            _, contrast, baseline, *_ = self._client.ask("adjustment.getContrastInPermille", [axis - 1])
+            shown[f"{column.channel} contrast"] = float(contrast)
+            shown[f"{column.channel} baseline"] = float(baseline)
+        nothing = (None,) * len(self.columns)
+        return Sample(nothing, ("aligning its optics",) * len(self.columns), signal=shown)
 
     def make_ready(self, is_begun: bool, tell: Callable[[str], None]) -> None:
         """Make sure that the instrument measures and reports no missing beam.

@@ -131,5 +131,21 @@ class Instrument(Protocol):
     def visit(self, number: int, index: int, digest: str) -> None:
         """Called before the first reading of a visit: a simulated instrument goes there."""
 
+    def set_up(self, number: int) -> None:
+        """Called where head and mirror of a set-up (from 1) are aligned: a simulated instrument goes there."""
+
+    def go_to(self, position: Sequence[float]) -> bool:
+        """Move a simulated machine to this position, mm. False: a person moves it."""
+
+    @property
+    def has_optics_alignment(self) -> bool:
+        """Whether it shows its signal in a mode of its own, in which it measures no distances."""
+
+    def optics_alignment(self, is_on: bool) -> None:
+        """Begin or end that mode."""
+
+    def signal(self) -> Sample:
+        """In that mode: a sample without values, but with its signal."""
+
     def make_ready(self, is_begun: bool, tell: Callable[[str], None]) -> None:
         """Called at the first reading of a set-up, or where it is taken up again (`is_begun`)."""

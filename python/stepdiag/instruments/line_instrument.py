@@ -14,6 +14,7 @@ from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
 from stepdiag._core import InvalidArgument, newer_format
+from stepdiag.instruments.ids3010 import TWIN
 from stepdiag.instruments.ids3010_messages import shown
 from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Sample, columns_of_signals
 from stepdiag.instruments.line_streams import Connection, LineFeed, ProgramOutput, Stream
@@ -57,26 +58,29 @@ def parse_header(line: bytes) -> LineHeader:
     return LineHeader(tuple(names), visits, about)
 
 
-def parse_sample(line: bytes, names: Sequence[str]) -> Sample | int:
+def parse_sample(line: bytes, names: Sequence[str]) -> Sample | int | str:
     """A sample with the columns `names`, which the line may have in any order; or the number of the visit that the
-    adapter has gone to. Raises ValueError saying what was expected."""
+    adapter has gone to; or what a twin has done. Raises ValueError saying what was expected."""
     content = _object(line, f"expected a value for each of {', '.join(names)}")
     if content.keys() == {"error"}:
         raise ValueError(f"the adapter says: {ascii(content['error'])[:200]}")
     if content.keys() == {"visit"}:
         return _visit(content["visit"])
+    if content.keys() == {"done"}:
+        return str(content["done"])
     values: list[float | None] = []
     for name in names:
         if name not in content:
             raise ValueError(f"{name}: expected a number or null, got none")
         values.append(_value(name, content.pop(name)))
     why, time = content.pop("why", "no reason given"), content.pop("time", None)
+    signal = _signal(content.pop("signal", {}))
     if not isinstance(why, str):
         raise ValueError("why: expected a text")
     if content:
-        raise ValueError(f"expected {', '.join(names)}, time and why only, got {next(iter(content))[:40]!a}")
+        raise ValueError(f"expected {', '.join(names)}, time, why and signal only, got {next(iter(content))[:40]!a}")
     reasons = tuple(why[:100] if value is None else "" for value in values)
-    return Sample(tuple(values), reasons, None if time is None else _time(time))
+    return Sample(tuple(values), reasons, None if time is None else _time(time), signal)
 
 
 class LineInstrument:
@@ -95,6 +99,7 @@ class LineInstrument:
         self._header: LineHeader | None = None
         self._newest: Sample | None = None
         self._at: int | None = None  # the visit that the adapter has gone to
+        self._done = ""  # what a twin did last
         self._old = 0  # samples since one was asked for that were taken before
 
     @property
@@ -166,6 +171,33 @@ class LineInstrument:
             lambda: f'expected the answer {{"visit": {number}}} within {self._timeout:g} s',
         )
 
+    def set_up(self, number: int) -> None:
+        self._ask_twin("set_up", number)
+
+    def go_to(self, position: Sequence[float]) -> bool:
+        return self._ask_twin("move", [float(one) for one in position])
+
+    has_optics_alignment = False
+
+    def optics_alignment(self, is_on: bool) -> None:
+        pass  # the signal comes with every sample
+
+    def signal(self) -> Sample:
+        return self.read()
+
+    def _ask_twin(self, what: str, content: Any) -> bool:
+        assert self._stream is not None
+        assert self._feed is not None
+        if self.describe().get("instrument") != TWIN:
+            return False
+        self._done = ""
+        try:
+            self._stream.send(json.dumps({what: content}).encode() + b"\n")
+        except OSError as error:
+            raise InstrumentError(f"{self.name}: cannot be asked: {reason(error)}") from None
+        self._feed.wait(self._timeout, lambda: self._done == what, lambda: f"no answer within {self._timeout:g} s")
+        return True
+
     def make_ready(self, is_begun: bool, tell: Callable[[str], None]) -> None:
         pass  # the adapter's business
 
@@ -179,6 +211,8 @@ class LineInstrument:
         found = parse_sample(line, [column.name for column in self._columns])
         if isinstance(found, Sample):
             self._newest = found
+        elif isinstance(found, str):
+            self._done = found
         else:
             self._at = found
 
@@ -266,6 +300,15 @@ def _value(name: str, value: Any) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise ValueError(f"{name}: expected a number of at most {LARGEST:g} or null, got {ascii(value)[:40]}")
     return float(value)
+
+
+def _signal(value: Any) -> dict[str, float]:
+    """How much light comes back: a number, or several by name."""
+    named = value if isinstance(value, dict) else {"signal": value}
+    for one in named.values():
+        if isinstance(one, bool) or not isinstance(one, int | float) or not abs(one) <= LARGEST:
+            raise ValueError(f"signal: expected a number, or an object of numbers, got {ascii(one)[:40]}")
+    return {str(name)[:30]: float(one) for name, one in list(named.items())[:8]}
 
 
 def _visit(value: Any) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -306,12 +307,14 @@ def _check_memory(known: Known, measurement: _core.Measurement, full_covariance:
     )
 
 
-def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
-    """How the scenario's run is simulated."""
+def simulation_options(
+    scenario: Scenario, turned: Mapping[str, _core.Misalignment] = MappingProxyType({})
+) -> _core.SimulationOptions:
+    """How the scenario's run is simulated; `turned`: lines that are misaligned otherwise."""
     known, truth = scenario.known, scenario.truth
     keys = known.keys
     return _core.SimulationOptions(
-        misalignment=dict(truth.misalignment),
+        misalignment={**truth.misalignment, **turned},
         noise=truth.noise,
         environment=truth.environment or known.assumed_air,
         assumed_environment=truth.assumed_environment if known.assumed_air is None else known.assumed_air,

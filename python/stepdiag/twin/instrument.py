@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.reading_plan import channels_of_axes, described_plan, digest_of
-from stepdiag.instruments.ids3010 import AXES, IDLE, RUNNING
+from stepdiag.instruments.ids3010 import ALIGNING, AXES, IDLE, RUNNING
 from stepdiag.instruments.instrument import columns_of_signals
 from stepdiag.scenario.description import Scenario, simulation_options
 from stepdiag.scenario.heads import of_run
@@ -20,6 +21,9 @@ from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
 PICOMETRES = 1e9  # in a millimetre
+BEST_CONTRAST = 800.0  # per mille
+CONTRAST_ANGLE = 304e-6  # rad, at which 1/e of it is left
+BASELINE = 40  # per mille
 # The numbers of the real instrument are not public; clients get the texts from errorNumberToString.
 NO_BEAM = 9001
 NOT_MEASURING = 9002
@@ -86,6 +90,7 @@ class TwinInstrument:
         self.mode = RUNNING
         self._interrupted = [False] * AXES
         self._reference = [0] * AXES
+        self._turned: dict[int, npt.NDArray[np.float64]] = {}  # by set-up: laser and reflector, rad
         self.visit_begun = threading.Event()  # for the thread that moves it
         self.moves_itself = False  # through the points of a visit (Twin, play)
 
@@ -147,6 +152,49 @@ class TwinInstrument:
             forward = number - 1 if visit.direction == "forward" else number - 2
             self._setup_row = repeated + self._first_rows[forward]
             self.visit_begun.set()
+
+    def turn(self, angles_urad: Sequence[float]) -> None:
+        """Turn laser and mirror of this set-up: angles of the laser about the local x and y, then of the mirror, µrad,
+        added to what they were misaligned by."""
+        change = np.array(angles_urad, dtype=float)
+        if change.shape != (4,) or not np.all(np.isfinite(change)):
+            raise InvalidArgument("turn: expected four finite angles")
+        with self._lock:
+            self._remember()
+            self._turned[self._set_up] = self._turned.get(self._set_up, np.zeros(4)) + change * MICRORADIAN
+            self._readouts.pop(self._set_up, None)
+
+    def contrast(self) -> float:
+        """What comes back into a single mode of 0.8 mm waist, per mille: it falls with the angle of the mirror to the
+        beam."""
+        with self._lock:
+            given = self._misalignment()
+        angle = float(np.linalg.norm(np.asarray(given.reflector) - np.asarray(given.laser)))
+        return BEST_CONTRAST * math.exp(-((angle / CONTRAST_ANGLE) ** 2))
+
+    def align(self, is_on: bool) -> None:
+        """Begin or end the mode in which an IDS3010 shows its contrast."""
+        with self._lock:
+            self.mode = ALIGNING if is_on else IDLE
+
+    def _misalignment(self) -> _core.Misalignment:
+        """Of this set-up, as it was turned."""
+        line = next(visit.line for visit in self._visits if visit.set_up == self._set_up)
+        given = self._scenario.truth.misalignment.get(line, _core.Misalignment())
+        turned = self._turned.get(self._set_up)
+        if turned is None:
+            return given
+        return _core.Misalignment(
+            np.asarray(given.reflector) + turned[2:],
+            np.asarray(given.laser) + turned[:2],
+            given.psd_zero,
+            given.distance_constant,
+            given.beam_constants,
+            lateral=given.lateral,
+            roll=given.roll,
+            gain=given.gain,
+            drift=given.drift,
+        )
 
     def state(self) -> dict[str, Any]:
         """The current state, for clients."""
@@ -264,11 +312,12 @@ class TwinInstrument:
         if self._set_up not in self._readouts:
             scenario = self._scenario
             line = next(visit.line for visit in self._visits if visit.set_up == self._set_up)
+            own = self._misalignment() if self._set_up in self._turned else None
             self._readouts[self._set_up] = _core.VirtualReadout(
                 self._machine,
                 scenario.known.plan,
                 self._heads,
                 line,
-                simulation_options(scenario),
+                simulation_options(scenario, {} if own is None else {line: own}),
             )
         return self._readouts[self._set_up]

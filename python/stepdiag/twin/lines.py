@@ -25,6 +25,11 @@ class LineSender:
 
     def __init__(self, instrument: TwinInstrument) -> None:
         self._instrument = instrument
+        self._own: dict[str, Callable[[Any], None]] = {
+            "set_up": lambda number: instrument.set_up(int(number)),
+            "move": instrument.move_to,
+            "turn": instrument.turn,
+        }
 
     def header(self) -> dict[str, Any]:
         names = [column.name for column in self._instrument.columns]
@@ -39,10 +44,17 @@ class LineSender:
             sample[column.name] = None if scaled is None else round(scaled, DIGITS[column.unit])
         if None in sample.values():
             sample["why"] = "the beam was interrupted"
-        return sample | {"time": now}
+        return sample | {"time": now, "signal": round(self._instrument.contrast(), 1)}
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         """The answer to an object of the acquisition: go to a visit."""
+        for name, act in self._own.items():
+            if request.keys() == {name}:
+                try:
+                    act(request[name])
+                except (InvalidArgument, TypeError, ValueError) as error:
+                    return {"error": str(error)}
+                return {"done": name}
         number, place, digest = request.get("visit"), request.get("place", 0), request.get("digest")
         if not _is_whole(number) or not _is_whole(place) or not (digest is None or isinstance(digest, str)):
             return {"error": 'expected {"visit": NUMBER, "place": NUMBER, "digest": TEXT}'}

@@ -1,8 +1,8 @@
 """A twin: a simulated instrument behind a socket, which measures a virtual machine that a controller moves.
 
 It is an IDS3010, or an adapter that sends lines (lines.py). In addition to the functions of the former it has
-`stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number],
-`stepdiag.twin.visit` [number, place, digest] and `stepdiag.twin.state` []; docs/acquisition.md describes them.
+`stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number], `stepdiag.twin.visit` [number, place, digest],
+`stepdiag.twin.turn` [four angles] and `stepdiag.twin.state` []; docs/acquisition.md describes them.
 """
 
 import contextlib
@@ -16,12 +16,12 @@ from types import TracebackType
 from typing import Any, Literal, Self, get_args
 
 from stepdiag._core import InvalidArgument, __version__
-from stepdiag.instruments.ids3010 import AXES, INTERFACES, RUNNING, TWIN
+from stepdiag.instruments.ids3010 import ALIGNING, AXES, INTERFACES, RUNNING, TWIN
 from stepdiag.instruments.ids3010_messages import JsonStream, encoded
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.scenario.order_of_run import visits_of
-from stepdiag.twin.instrument import NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
+from stepdiag.twin.instrument import BASELINE, NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
 from stepdiag.twin.lines import LineSender, send_lines
 from stepdiag.twin.temperatures import TwinTemperatures
 
@@ -158,6 +158,10 @@ class Answers:
             "system.startMeasurement": lambda _: _done(instrument.start),
             "system.restartMeasurement": lambda _: self._restart(),
             "system.stopMeasurement": lambda _: _done(instrument.stop),
+            "system.startOpticsAlignment": lambda _: _done(lambda: instrument.align(True)),
+            "system.stopOpticsAlignment": lambda _: _done(lambda: instrument.align(False)),
+            "adjustment.getAdjustmentEnabled": lambda _: [0, instrument.mode == ALIGNING],
+            "adjustment.getContrastInPermille": self._contrast,
             "system.resetError": lambda _: _done(instrument.reset_error),
             "system.resetAxes": lambda _: _done(instrument.reset_displacement),
         }
@@ -169,6 +173,7 @@ class Answers:
             "com.attocube.system.errorNumberToString": _error_text,
             "stepdiag.twin.moveTo": self._move_to,
             "stepdiag.twin.setUp": self._set_up,
+            "stepdiag.twin.turn": self._turn,
             "stepdiag.twin.visit": self._visit,
             "stepdiag.twin.state": self._state,
         }
@@ -201,6 +206,20 @@ class Answers:
     def _set_up(self, params: Params) -> list[Any]:
         self._instrument.set_up(*_whole("setUp: expected the number of a set-up", params, 1, 1))
         return [0]
+
+    def _turn(self, params: Params) -> list[Any]:
+        if len(params) != 4 or not all(_is_number(value) for value in params):
+            raise InvalidArgument("turn: expected two angles of the laser and two of the mirror in urad")
+        self._instrument.turn([float(value) for value in params])
+        return [0]
+
+    def _contrast(self, params: Params) -> list[Any]:
+        (axis,) = _whole("expected the number of an axis", params, 1, 1)
+        if not 0 <= axis < AXES:
+            return [WRONG_AXIS, 0, 0, 0]
+        if self._instrument.mode != ALIGNING:
+            return [NOT_MEASURING, 0, 0, 0]
+        return [0, round(self._instrument.contrast()), BASELINE, 0]
 
     def _visit(self, params: Params) -> list[Any]:
         digest = params[2] if len(params) > 2 else None

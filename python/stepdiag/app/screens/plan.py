@@ -6,8 +6,9 @@ from typing import Final
 import numpy as np
 from starlette.responses import HTMLResponse
 
+from stepdiag.acquisition.placement import corner_words
 from stepdiag.app.frame import address, day, file_address, page
-from stepdiag.app.machine_drawing import PlannedLine, place_words, plan_figure, planned_lines
+from stepdiag.app.machine_drawing import PlannedLine, plan_figure, planned_lines
 from stepdiag.book.book import Entry, MachineFolder
 from stepdiag.book.layout import main_file
 from stepdiag.planning.measuring_time import measuring_time, times_of
@@ -110,8 +111,8 @@ def _lines(known: Known, lines: Sequence[PlannedLine]) -> Markup:
         (
             f"{one.set_up}",
             f"{one.name}{', scale line' if one.is_scale_line else ''}",
-            place_words(one.first.positions[0], volume),
-            place_words(one.first.positions[-1], volume),
+            corner_words(one.first.positions[0], volume),
+            corner_words(one.first.positions[-1], volume),
             ", ".join(f"{float(x) + 0.0:.0f}".replace("-", "−") for x in one.head + np.asarray(known.tool)),
             f"{len(one.first.positions)}" + (f" × {one.passes}" if one.passes > 1 else ""),
         )

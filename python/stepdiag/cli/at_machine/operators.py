@@ -84,11 +84,11 @@ class Terminal(Watched):
         self._clear()
         self._answers = answers
         if answers == ["confirm"]:
-            click.echo(f"{plain(in_flags(text))}: Enter", nl=False)
+            click.echo(f"{plain(in_flags(text))}: Enter", nl=self._is_terminal)  # what is read stands below it
         else:
             self.tell(f"warning: {text}")
             if sys.stdin.isatty():
-                click.echo("repeat [r], keep [k]: ", nl=False)
+                click.echo("repeat [r], keep [k]: ", nl=self._is_terminal)
         sys.stdout.flush()
 
     def answered(self) -> Control | None:
@@ -115,7 +115,7 @@ class Terminal(Watched):
             super().show(state)
             return
         now = time.monotonic()
-        if state.doing in ("asks", "ended") or now - self._shown < BETWEEN_LINES:
+        if state.doing == "ended" or now - self._shown < BETWEEN_LINES:
             return
         self._shown = now
         text = plain(status_line(state))[: max(20, os.get_terminal_size().columns - 1)]
@@ -133,7 +133,7 @@ class Terminal(Watched):
         ended = "standard input ended before Enter was pressed; --resume continues"
         try:
             number = sys.stdin.fileno()
-        except (OSError, ValueError):  # no file, such as in a notebook
+        except (AttributeError, OSError, ValueError):  # no file, such as in a notebook
             line = sys.stdin.readline()
             if not line:
                 raise InvalidArgument(ended) from None
@@ -152,6 +152,8 @@ class Terminal(Watched):
 
 def status_line(state: LiveState) -> str:
     """What happens, in one line."""
+    if state.limit_urad is not None:
+        return _alignment_line(state)
     done = round(BAR * (state.index + (state.doing == "reads")) / max(state.points, 1))
     bar = "█" * done + "·" * (BAR - done)
     if state.reasons:
@@ -166,6 +168,20 @@ def status_line(state: LiveState) -> str:
         f"{state.line} {bar} point {state.point} {state.doing} {beside} | {state.readings} of {state.planned} "
         f"readings{lost}{left}"
     )
+
+
+def _alignment_line(state: LiveState) -> str:
+    """While head and mirror are aligned."""
+    parts = [state.line]
+    if state.cross_urad is not None:
+        right, up = state.cross_urad
+        size = (right**2 + up**2) ** 0.5
+        word = "within" if size <= (state.limit_urad or 0.0) else "above"
+        parts.append(f"mirror to beam {right:+.0f} right, {up:+.0f} up µrad, {word} {state.limit_urad:.0f}")
+    if state.distance_mm is not None:
+        parts.append(f"{state.distance_mm:.4f} mm")
+    parts += [f"{name} {value:.0f}" for name, value in state.signal.items()]
+    return " | ".join([*parts, *(["NO BEAM"] if state.distance_mm is None and not state.signal else [])])
 
 
 class FitSoFar:
