@@ -49,7 +49,7 @@ BELOW: dict[str, set[str]] = {
     "platform": set(),
     "app": {"book", "platform"},
     "demo": {"presentation", "program", "linuxcnc", "twin"},
-    "cli": {"demo", "progress", "importing", "app"},
+    "cli": {"demo", "progress", "importing", "app", "alignment"},
     # What the package shows to specialists.
     "optics": {"head"},
     "methods": {"planning"},

@@ -287,8 +287,9 @@ def test_operator_asks_for_every_reading(tmp_path: Path) -> None:
     placements = [text for text in operator.told if text.startswith("set-up")]
     # The corner that the line begins in, with the tool (3, -2, 40): 100 mm before it the head.
     assert placements[0] == (
-        "set-up 1, line ppp: beam from (-68.55, -55.67, -4.72) mm along (0.715542, 0.536656, 0.447214), "
-        "mirror on the tool across it, which starts at (3.00, -2.00, 40.00) mm"
+        "set-up 1 of 2, line ppp: head at the front left low corner, its beam from X-68.6 Y-55.7 Z-4.7 mm, "
+        "looking along X+, turned 36.9° to the left, 26.6° up; mirror in the spindle at X3.0 Y-2.0 Z40.0 mm, "
+        "facing the head, along X-, turned 36.9° to the left, 26.6° down"
     )
     assert placements[1] == "set-up 1 stays as it is: run 1, backward"
-    assert placements[2].startswith("set-up 2, line npp: beam from (154.55, ")
+    assert placements[2].startswith("set-up 2 of 2, line npp: head at the front right low corner, its beam from X154.6 ")

@@ -37,7 +37,7 @@ def align(scenario: Path, source: str, lines: tuple[str, ...], live: Path | None
     """
     from stepdiag.acquisition.acquire import instrument_of
     from stepdiag.acquisition.conductor import Conductor
-    from stepdiag.alignment.alignment_loop import AlignmentLoop, first_visits
+    from stepdiag.alignment.loop import AlignmentLoop, first_visits
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.order_of_run import visits_of
 
