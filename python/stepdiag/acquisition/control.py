@@ -52,10 +52,11 @@ class ControlFile:
         for line in data[:whole].splitlines():
             try:
                 content = json.loads(line)
-            except ValueError:
+            except (ValueError, RecursionError):
                 continue
-            if isinstance(content, dict) and content.get("control") in CONTROLS:
-                yield cast(Control, content["control"]), str(content.get("text", ""))[:LONGEST_REMARK]
+            control = content.get("control") if isinstance(content, dict) else None
+            if isinstance(control, str) and control in CONTROLS:
+                yield cast(Control, control), str(content.get("text", ""))[:LONGEST_REMARK]
 
 
 def ask_for(path: Path, control: Control, text: str = "") -> None:

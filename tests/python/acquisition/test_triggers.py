@@ -292,4 +292,6 @@ def test_operator_asks_for_every_reading(tmp_path: Path) -> None:
         "facing the head, along X-, turned 36.9° to the left, 26.6° down"
     )
     assert placements[1] == "set-up 1 stays as it is: run 1, backward"
-    assert placements[2].startswith("set-up 2 of 2, line npp: head at the front right low corner, its beam from X154.6 ")
+    assert placements[2].startswith(
+        "set-up 2 of 2, line npp: head at the front right low corner, its beam from X154.6 "
+    )
