@@ -61,7 +61,7 @@ def acquire(
     operator: Operator | None = None,
     temperatures: Path | None = None,
     watched: bool = False,
-    after_visit: Callable[[], None] | None = None,
+    after_visit: Callable[[Conductor], None] | None = None,
 ) -> Acquired:
     """Acquire the readings of a scenario's plan from an instrument and write the measurement.
 
@@ -81,7 +81,7 @@ def acquire(
         operator: receives messages and confirms; None: messages are dropped.
         temperatures: CSV file that another program appends temperatures to (docs/acquisition.md).
         watched: publish what happens beside the raw file, and do what watchers want (docs/acquisition.md).
-        after_visit: called when a line has been read and `output` has it.
+        after_visit: called when a line has been read and `output` has it; may `tell` the people.
 
     Raises:
         InvalidArgument: an option, the head or a file does not suit, or a file exists that would be
@@ -128,7 +128,7 @@ def acquire(
                 )
                 write_measurement(run, output)
                 if after_visit is not None:
-                    after_visit()
+                    after_visit(conductor)
 
             try:
                 work.run(source, write)

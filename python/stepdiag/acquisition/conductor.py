@@ -69,6 +69,7 @@ class Conductor:
         self.remark: Callable[[str], None] = lambda _: None
         self.cross: Callable[[Sample], tuple[float, float] | None] = lambda _: None
         self.source = instrument.read  # of samples
+        self.meanwhile: Callable[[], None] = lambda: None  # called while nothing is read
         self._published = self._looked = self._tried = 0.0
         self._asked = 0
         self._nominal = 0.0  # distance at the point that is read or waited for, mm
@@ -111,6 +112,7 @@ class Conductor:
     def _show(self) -> None:
         """Also where nobody reads now: the distance lives on the screen while the machine moves."""
         now = time.monotonic()
+        self.meanwhile()
         if not self._is_followed or now - self._published < BETWEEN_STATES or now < self._tried:
             return
         try:

@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, Literal
 
 from stepdiag._core import InvalidArgument
 from stepdiag.io.whole_files import reason
@@ -56,7 +56,7 @@ class ControlFile:
                 continue
             control = content.get("control") if isinstance(content, dict) else None
             if isinstance(control, str) and control in CONTROLS:
-                yield cast(Control, control), str(content.get("text", ""))[:LONGEST_REMARK]
+                yield control, str(content.get("text", ""))[:LONGEST_REMARK]
 
 
 def ask_for(path: Path, control: Control, text: str = "") -> None:

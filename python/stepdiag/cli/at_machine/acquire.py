@@ -10,7 +10,8 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.options import AcquireOptions, Resume
 from stepdiag.acquisition.settling import Settling
-from stepdiag.cli.at_machine.operators import FitSoFar, Terminal, Watched
+from stepdiag.cli.at_machine.fit_so_far import FitSoFar
+from stepdiag.cli.at_machine.operators import Terminal, Watched
 from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.interrupts import unwinding
 from stepdiag.cli.options import PATH, Writes, made_of, options_of, out_file, tell, tell_inputs
@@ -111,8 +112,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     def continuation() -> str | None:
         return f"{raw.path} has the readings so far: repeat the command with --resume" if is_begun(raw.path) else None
 
-    fits = FitSoFar(scenario, path)
-    with at_end(continuation), unwinding():
+    with FitSoFar(scenario, path) as fits, at_end(continuation), unwinding():
         result = acquire(
             described.known,
             given["source"],
@@ -126,7 +126,6 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
             watched=True,
             after_visit=fits.begin,
         )
-    fits.end()
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
 

@@ -2,10 +2,8 @@
 
 import os
 import select
-import subprocess
 import sys
 import time
-from pathlib import Path
 from typing import Final
 
 import click
@@ -18,7 +16,6 @@ from stepdiag.cli.terminal import plain
 
 BETWEEN_LINES: Final = 0.2  # s between two states on a terminal
 BAR: Final = 20  # columns
-_TOLD: Final = ("fit:", "rejected because", "doubtful because", "undetermined: scale", "undetermined: C0Y", "repeat")
 _KEYS: Final[dict[str, Control]] = {"r": "repeat_point", "k": "keep"}
 
 
@@ -61,7 +58,7 @@ class Terminal(Watched):
         self._is_terminal = sys.stdout.isatty()
         self._width = 0  # of the last line
         self._shown = 0.0
-        self._line = 0  # a line's bar has been written for this visit
+        self._is_open = False  # a question stands in the last line
         self._typed = b""
         self._answers: list[Control] = []
 
@@ -85,6 +82,7 @@ class Terminal(Watched):
         self._answers = answers
         if answers == ["confirm"]:
             click.echo(f"{plain(in_flags(text))}: Enter", nl=self._is_terminal)  # what is read stands below it
+            self._is_open = not self._is_terminal
         else:
             self.tell(f"warning: {text}")
             if sys.stdin.isatty():
@@ -98,7 +96,7 @@ class Terminal(Watched):
         if line is None:
             return None
         if not sys.stdin.isatty():
-            click.echo()  # a terminal shows the Enter itself
+            self._clear()  # a terminal shows the Enter itself
         if self._answers == ["confirm"]:
             return "confirm"
         answer = _KEYS.get(line.strip().lower())
@@ -124,6 +122,9 @@ class Terminal(Watched):
         sys.stdout.flush()
 
     def _clear(self) -> None:
+        if self._is_open:
+            click.echo()
+            self._is_open = False
         if self._width:
             click.echo("\r" + " " * self._width + "\r", nl=False)
             self._width = 0
@@ -182,40 +183,3 @@ def _alignment_line(state: LiveState) -> str:
         parts.append(f"{state.distance_mm:.4f} mm")
     parts += [f"{name} {value:.0f}" for name, value in state.signal.items()]
     return " | ".join([*parts, *(["NO BEAM"] if state.distance_mm is None and not state.signal else [])])
-
-
-class FitSoFar:
-    """Evaluates the readings after each line, in a process of its own, and says what came of it."""
-
-    def __init__(self, scenario: Path, run: Path) -> None:
-        self._scenario, self._run = scenario, run
-        self._process: subprocess.Popen[str] | None = None
-        self._is_behind = False  # readings have come since it began
-
-    def begin(self) -> None:
-        """Say what came of the last one, and begin another; while it runs, no third."""
-        self._is_behind = self._process is not None and self._process.poll() is None
-        if self._is_behind:
-            return
-        self._tell()
-        command = [sys.executable, "-m", "stepdiag", "evaluate", str(self._scenario), str(self._run)]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-
-    def end(self) -> None:
-        """Say what came of all readings."""
-        self._tell()
-        if self._is_behind:
-            self.begin()
-            self._tell()
-
-    def _tell(self) -> None:
-        if self._process is None:
-            return
-        said, wrong = self._process.communicate()
-        status, self._process = self._process.returncode, None
-        found = said.splitlines() if status in (0, 3) else wrong.splitlines()[-1:]
-        for line in found:
-            if status not in (0, 3) or line.startswith(_TOLD):
-                click.echo(plain(f"so far: {line}"))
