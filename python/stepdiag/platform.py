@@ -26,3 +26,17 @@ def exit_code(status: int) -> int:
 def open_browser(address: str) -> bool:
     """In the person's own browser. False: there is none."""
     return webbrowser.open(address)
+
+
+def is_running(process: int) -> bool:
+    """Whether there is a process of this number that we may ask."""
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, PermissionError, OverflowError):
+        return False
+    return True
+
+
+def quiet_environment() -> dict[str, str]:
+    """Of a process whose output is a file: no colours, and what it says comes at once."""
+    return {**os.environ, "NO_COLOR": "1", "PYTHONUNBUFFERED": "1"}

@@ -151,7 +151,7 @@ def _checked_raw_path(raw: Path | None, output: Path) -> Path:
     path = raw or raw_path(output)
     if path.resolve() == output.resolve():
         raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
-    if output.exists() and not path.exists():
+    if output.exists() and output.stat().st_size > 0 and not path.exists():  # an empty one holds a name
         raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
     return path
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
+from types import TracebackType
 from typing import Final, Protocol, Self, runtime_checkable
 
 from stepdiag.acquisition.control import Control, ControlFile
@@ -82,8 +83,12 @@ class Conductor:
             self._live, self._control = LiveFile(live_path(self._raw)), ControlFile(control_path(self._raw))
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.state.question, self.state.answers = "", []
+        if error is not None:
+            self.state.failure = "stopped" if isinstance(error, KeyboardInterrupt | SystemExit) else str(error)
         self.doing("ended")
         if self._live is not None:
             self._live.close()

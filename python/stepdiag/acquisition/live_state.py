@@ -34,6 +34,7 @@ class LiveState:
 
     doing: Doing = "begins"
     process: int = field(default_factory=os.getpid)
+    failure: str = ""  # why it ended before it was done
     question: str = ""
     answers: list[str] = field(default_factory=list)
     asked: int = 0  # questions so far

@@ -28,7 +28,7 @@ _LOOKS: Final = {
     "not within": ("bad", "✕"),
     "damaged": ("bad", "✕"),
 }
-STATIC: Final = {"app.css": "text/css", "app.js": "text/javascript"}
+STATIC: Final = {"app.css": "text/css", "app.js": "text/javascript", "live.js": "text/javascript"}
 
 
 def page(
@@ -38,8 +38,10 @@ def page(
     path: Sequence[tuple[str, str]] = (),
     search: str = "",
     status: int = 200,
+    scripts: Sequence[str] = (),
 ) -> HTMLResponse:
-    """A whole page. command: what does the same on the command line. path: the screens above, address and name."""
+    """A whole page. command: what does the same on the command line. path: the screens above, address and name.
+    scripts: beside app.js."""
     above = [element("li", element("a", name, href=address)) for address, name in [("/", "Machines"), *path]]
     form = element(
         "form",
@@ -66,7 +68,7 @@ def page(
         element("title", f"{title} – stepdiag"),
         element("link", rel="stylesheet", href="/static/app.css"),
         element("link", rel="icon", href="data:,"),
-        element("script", type="module", src="/static/app.js"),
+        *(element("script", type="module", src=f"/static/{name}") for name in ("app.js", *scripts)),
     )
     return HTMLResponse(
         f'<!DOCTYPE html>\n<html lang="en">\n<head>{head}</head>\n<body>\n{markup(*body)}\n</body>\n</html>\n', status

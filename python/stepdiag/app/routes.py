@@ -9,25 +9,37 @@ import asyncio
 import contextlib
 import hashlib
 import tempfile
+import time
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, quote
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.responses import (
+    FileResponse,
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+    StreamingResponse,
+)
 from starlette.routing import Route
 
 from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.control import CONTROLS
 from stepdiag.app.frame import STATIC, address, static_text
 from stepdiag.app.jobs import CommandJob, Jobs
+from stepdiag.app.live_runs import ALIGNMENT, LiveRun, LiveRuns, RawTail, event
 from stepdiag.app.screens.calibration import calibration_screen
 from stepdiag.app.screens.compensate import FORMATS, NONE, compensate_screen
 from stepdiag.app.screens.job import job_screen
+from stepdiag.app.screens.live import live_screen
 from stepdiag.app.screens.machine import machine_screen
 from stepdiag.app.screens.machines import machines_screen, refusal_screen, search_screen
+from stepdiag.app.screens.measure import measure_screen
 from stepdiag.app.screens.new_machine import new_machine_screen
 from stepdiag.app.screens.plan import plan_screen
 from stepdiag.app.screens.report import FIELDS, report_screen
@@ -35,7 +47,10 @@ from stepdiag.app.screens.trend import trend_screen
 from stepdiag.app.security import REPORT_POLICY, Guard, TooLarge
 from stepdiag.book.book import Book, Entry, MachineFolder
 from stepdiag.book.layout import main_file, safe_name
+from stepdiag.io.data_files import date_of_today
 
+BETWEEN_STATES: Final = 0.03  # s, of a stream
+BETWEEN_LOOKS: Final = 1.0  # s, at what a process said
 SHEETS: Final = (".xlsx", ".ods", ".xls", ".txt", ".tsv")  # that `stepdiag import` reads
 
 
@@ -49,6 +64,7 @@ class App:
     def __init__(self, book: Path, temporary: Path) -> None:
         self._folder, self._temporary = book.absolute(), temporary
         self.jobs = Jobs()
+        self.live = LiveRuns(self._folder)
         self._drawn: dict[str, asyncio.Lock] = {}
 
     # --- what is there ----------------------------------------------------------------------------------------------
@@ -110,6 +126,62 @@ class App:
 
     def show_report(self, request: Request) -> Response:
         return report_screen(*self.calibration(request))
+
+    def show_measure(self, request: Request) -> Response:
+        machine = self.machine(request)
+        return measure_screen(machine, self.live.of(machine))
+
+    def show_live(self, request: Request) -> Response:
+        machine, run = self._live_run(request)
+        named = request.query_params.get("scenario", "")
+        return live_screen(machine, run, self.entry(machine, named) if named else machine.last("scenario"))
+
+    def _live_run(self, request: Request) -> tuple[MachineFolder, LiveRun]:
+        machine, name = self.machine(request), request.path_params["name"]
+        run = next((one for one in self.live.of(machine) if one.name == name), None)
+        if run is None:
+            raise NotHere(f"Nothing of the name {name} was measured here.")
+        return machine, run
+
+    async def live_events(self, request: Request) -> Response:
+        """The stream of an acquisition: its state many times a second, its readings as they come, what it said."""
+        _, run = await asyncio.to_thread(self._live_run, request)
+        return StreamingResponse(_events(run), media_type="text/event-stream")
+
+    async def control(self, request: Request) -> Response:
+        """What the person wants of a process that runs."""
+        _, run = await asyncio.to_thread(self._live_run, request)
+        given = await _form(request)
+        wanted = next((one for one in CONTROLS if one == given.get("control")), None)
+        if wanted is None:
+            raise NotHere("There is no such control.")
+        run.ask(wanted, given.get("text", ""))
+        return Response(status_code=204)
+
+    async def begin(self, request: Request) -> Response:
+        """Starts an alignment or a run, or goes on with a run; it does not end with the server."""
+        machine, given = await asyncio.to_thread(self.machine, request), await _form(request)
+        what = given.get("what", "")
+        if what == "resume":
+            entry = self.entry(machine, f"runs/{given.get('name', '')}.csv")
+            begun = entry.record.command if entry.record is not None else ()
+            if begun[1:2] != ("acquire",):
+                raise NotHere(f"{entry.file} was not measured here.")
+            words = [*begun[1:], *(["--resume"] if "--resume" not in begun else [])]
+            run = LiveRun(machine, Path(entry.name).stem)
+        else:
+            common = [*self._of(machine), self.entry(machine, given.get("scenario", "")).file]
+            common += ["--watched", *_options(given, ("source",))]
+            if what == "align":
+                run = LiveRun(machine, ALIGNMENT)
+                words = ["align", *common, "--live", str(run.raw)]
+            else:
+                name = await asyncio.to_thread(_free, machine, "runs", date_of_today()[:10], ".csv")
+                run = LiveRun(machine, Path(name).stem)
+                words = ["acquire", *common, *_options(given, ("trigger",)), "-o", name]
+        await asyncio.to_thread(self.live.begin, run, words)
+        scenario = f"?scenario={quote(given['scenario'])}" if given.get("scenario") else ""
+        return RedirectResponse(address(machine.name, "live", run.name) + scenario, 303)
 
     def show_job(self, request: Request) -> Response:
         return job_screen(self._job(request))
@@ -314,6 +386,11 @@ def application(book: Path, temporary: Path, port: int, token: str) -> Guard:
         Route(f"{machine}/plans", _told(app.plan), methods=["POST"]),
         Route(f"{machine}/picture/{{file:path}}", _told(app.picture)),
         Route(f"{machine}/trend", _told(app.show_trend)),
+        Route(f"{machine}/measure", _told(app.show_measure)),
+        Route(f"{machine}/begin", _told(app.begin), methods=["POST"]),
+        Route(f"{machine}/live/{{name}}", _told(app.show_live)),
+        Route(f"{machine}/live/{{name}}/events", _told(app.live_events)),
+        Route(f"{machine}/live/{{name}}/control", _told(app.control), methods=["POST"]),
         Route(f"{machine}/figures/{{name}}", _told(app.figures)),
         Route(f"{machine}/report/{{name}}", _told(app.show_report)),
         Route(f"{machine}/file/{{file:path}}", _told(app.file)),
@@ -330,6 +407,29 @@ def application(book: Path, temporary: Path, port: int, token: str) -> Guard:
         Route("/jobs/{job}/stop", _told(app.stop), methods=["POST"]),
     ]
     return Guard(Starlette(routes=routes, lifespan=lifespan), port, token)
+
+
+async def _events(run: LiveRun) -> AsyncIterator[bytes]:
+    """Ends with the client."""
+    tail, said, looked = RawTail(run.raw), "", -1.0
+    shown: tuple[object, ...] = ()
+    stored: tuple[object, ...] = ()
+    while True:
+        state = run.state()
+        now = () if state is None else (state["process"], state["number"], state["doing"])
+        if state is not None and now != shown:
+            shown = now
+            yield event("state", state)
+            read = (state["process"], state["stored"], state["readings"])
+            if read != stored:
+                stored = read
+                yield event("readings", await asyncio.to_thread(tail.new))
+        if time.monotonic() - looked > BETWEEN_LOOKS:
+            looked = time.monotonic()
+            text = run.said()
+            yield event("said", text) if text != said else b": \n\n"  # so that a client that is gone is noticed
+            said = text
+        await asyncio.sleep(BETWEEN_STATES)
 
 
 def _told(handler: Callable[[Request], Any]) -> Callable[[Request], Any]:

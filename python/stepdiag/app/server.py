@@ -22,7 +22,13 @@ def serve(book: Path, port: int, opened: Callable[[str], None]) -> None:
         port, token = listener.getsockname()[1], secrets.token_urlsafe(24)
         app = application(book, Path(temporary), port, token)
         config = uvicorn.Config(
-            app, log_level="error", access_log=False, server_header=False, ws="none", proxy_headers=False
+            app,
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            ws="none",
+            proxy_headers=False,
+            timeout_graceful_shutdown=1,
         )
         server = _Announcing(config, partial(opened, f"http://127.0.0.1:{port}{ENTRANCE}?token={token}"))
         server.run(sockets=[listener])

@@ -32,7 +32,12 @@ def machine_screen(machine: MachineFolder) -> HTMLResponse:
         name,
         _now(row),
         _about(row),
-        element("p", element("a", "Plan a measurement", href=address(name, "plan"), class_="button")),
+        element(
+            "p",
+            element("a", "Plan a measurement", href=address(name, "plan"), class_="button"),
+            " ",
+            element("a", "Measure", href=address(name, "measure"), class_="button"),
+        ),
         _import(name),
         _calibrations(row, entries),
         _runs(name, entries),

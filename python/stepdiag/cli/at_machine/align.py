@@ -27,7 +27,12 @@ from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, made_of, options_of, t
 )
 @click.option("--line", "lines", multiple=True, metavar="LINE", help="Only this line; may be given again.")
 @options_of(AcquireOptions, only=("axes", "sign", "timeout"))
-@click.option("--live", type=PATH, metavar="FILE", help="Raw file beside which others may watch.")
+@click.option(
+    "--live",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Raw file beside which others may watch.",
+)
 @click.option("--watched", is_flag=True, help="Questions are answered by whoever watches, not at standard input.")
 def align(scenario: Path, source: str, lines: tuple[str, ...], live: Path | None, watched: bool, **given: Any) -> None:
     """Align head and mirror of SCENARIO's lines, one after the other.
