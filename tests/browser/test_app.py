@@ -1,11 +1,6 @@
 """The application as a person uses it: from a new machine to the report, by mouse and keyboard, without a network."""
 
-import os
 import re
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,31 +8,13 @@ from typing import Any
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page, expect
+from running_app import Running
 from small_scenario import SCENARIO
 
 from stepdiag.cli import main
 
 SOUND = SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
 WIDTHS = (1280, 768)
-
-
-class Running:
-    """`stepdiag app` on a book."""
-
-    def __init__(self, book: Path) -> None:
-        start = time.monotonic()
-        command = [sys.executable, "-m", "stepdiag", "app", str(book), "--no-browser"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "TZ": "UTC"})
-        assert self.process.stdout is not None
-        said = self.process.stdout.readline()
-        self.took = time.monotonic() - start
-        found = re.search(r"http://\S+", said)
-        assert found is not None, said
-        self.address = found[0]
-
-    def end(self) -> int:
-        self.process.send_signal(signal.SIGINT)
-        return self.process.wait(20.0)
 
 
 @pytest.fixture(scope="module")

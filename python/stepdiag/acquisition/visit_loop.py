@@ -159,6 +159,7 @@ class Acquisition:
             self._operator.tell(f"once more: {point_text(visit, index)}")
             return True
         self._leave_out(again)
+        self._visit = 0  # an instrument that goes to visits goes there again
         self._operator.tell(f"once more: {again} {visit.line if again == 'line' else visit.set_up}, from its beginning")
         return True
 

@@ -170,6 +170,8 @@ class App:
             words = [*begun[1:], *(["--resume"] if "--resume" not in begun else [])]
             run = LiveRun(machine, Path(entry.name).stem)
         else:
+            if given.get("source", "").startswith("program:"):
+                raise NotHere("A page starts no programs: begin with the command line, and watch it here.")
             common = [*self._of(machine), self.entry(machine, given.get("scenario", "")).file]
             common += ["--watched", *_options(given, ("source",))]
             if what == "align":

@@ -90,6 +90,7 @@ class TwinInstrument:
         self.mode = RUNNING
         self._interrupted = [False] * AXES
         self._reference = [0] * AXES
+        self._is_dark = False
         self._turned: dict[int, npt.NDArray[np.float64]] = {}  # by set-up: laser and reflector, rad
         self.visit_begun = threading.Event()  # for the thread that moves it
         self.moves_itself = False  # through the points of a visit (Twin, play)
@@ -163,6 +164,11 @@ class TwinInstrument:
             self._remember()
             self._turned[self._set_up] = self._turned.get(self._set_up, np.zeros(4)) + change * MICRORADIAN
             self._readouts.pop(self._set_up, None)
+
+    def block(self, is_dark: bool) -> None:
+        """Hold something into the beams, or take it away."""
+        with self._lock:
+            self._is_dark, self._exact = bool(is_dark), None
 
     def contrast(self) -> float:
         """What comes back into a single mode of 0.8 mm waist, per mille: it falls with the angle of the mirror to the
@@ -291,7 +297,7 @@ class TwinInstrument:
         return distances
 
     def _distances(self) -> list[float | None]:
-        if self._point() in self._behaviour.lost:
+        if self._is_dark or self._point() in self._behaviour.lost:
             return [None] * len(self._channels)
         seconds = self._scenario.known.keys.plan.seconds_per_reading or 0.0
         elapsed = max(0, self._row - self._setup_row) * seconds

@@ -29,6 +29,7 @@ class LineSender:
             "set_up": lambda number: instrument.set_up(int(number)),
             "move": instrument.move_to,
             "turn": instrument.turn,
+            "block": instrument.block,
         }
 
     def header(self) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 It is an IDS3010, or an adapter that sends lines (lines.py). In addition to the functions of the former it has
 `stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number], `stepdiag.twin.visit` [number, place, digest],
-`stepdiag.twin.turn` [four angles] and `stepdiag.twin.state` []; docs/acquisition.md describes them.
+`stepdiag.twin.turn` [four angles], `stepdiag.twin.block` [1 or 0] and `stepdiag.twin.state` [];
+docs/acquisition.md describes them.
 """
 
 import contextlib
@@ -174,6 +175,7 @@ class Answers:
             "stepdiag.twin.moveTo": self._move_to,
             "stepdiag.twin.setUp": self._set_up,
             "stepdiag.twin.turn": self._turn,
+            "stepdiag.twin.block": self._block,
             "stepdiag.twin.visit": self._visit,
             "stepdiag.twin.state": self._state,
         }
@@ -211,6 +213,10 @@ class Answers:
         if len(params) != 4 or not all(_is_number(value) for value in params):
             raise InvalidArgument("turn: expected two angles of the laser and two of the mirror in urad")
         self._instrument.turn([float(value) for value in params])
+        return [0]
+
+    def _block(self, params: Params) -> list[Any]:
+        self._instrument.block(bool(_whole("block: expected 1 or 0", params, 1, 1)[0]))
         return [0]
 
     def _contrast(self, params: Params) -> list[Any]:

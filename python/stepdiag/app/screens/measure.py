@@ -62,8 +62,8 @@ def _start(name: str, scenarios: list[str]) -> Markup:
     ]
     kinds = element(
         "p",
-        "An attocube IDS3010: ids3010:// and its address. An adapter that sends lines: lines://127.0.0.1:PORT, "
-        "serial:PORT, or program: and the command that starts it.",
+        "An attocube IDS3010: ids3010:// and its address. An adapter that sends lines: lines://127.0.0.1:PORT. "
+        "A program that sends them is started on the command line; its run can be watched here.",
         class_="quiet",
         id="sources",
     )

@@ -120,8 +120,10 @@ class LivePage {
     this.messages(state.messages);
     const ended = place("ended");
     if (ended) ended.hidden = state.doing !== "ended";
-    const controls = place("controls");
-    if (controls) controls.hidden = state.doing === "ended";
+    for (const id of ["controls", "remarks"]) {
+      const element = place(id);
+      if (element) element.hidden = state.doing === "ended";
+    }
     const resume = place("resume");
     if (resume) resume.hidden = state.readings >= state.planned;
   }

@@ -65,7 +65,7 @@ class FitSoFar:
         process, self._process = self._process, None
         said, wrong = process.communicate()
         written = process.returncode in _WRITTEN
-        lines = said.splitlines() if written else wrong.splitlines()[-1:]
+        lines = said.splitlines() if written else [wrong.strip().split("\n")[-1].split(f"{self._run}: ")[-1]]
         found = [line for line in lines if not written or line.startswith(_TOLD)]
         if conductor.state.readings < conductor.state.planned:  # advice would be what comes anyway
             wanting = [line.split(": ")[1] for line in found if line.startswith(_UNDETERMINED)]
