@@ -1,8 +1,8 @@
 """Acquisition of a run: from the instrument to a raw file, then to a measurement file."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from stepdiag.acquisition.visit_loop import Acquisition
 from stepdiag.instruments.ids3010 import Ids3010, parse_source
 from stepdiag.instruments.ids3010_instrument import Ids3010Instrument
 from stepdiag.instruments.instrument import Instrument, InstrumentError
+from stepdiag.instruments.joined import JoinedInstruments
 from stepdiag.instruments.line_instrument import line_instrument
 from stepdiag.io.data_files import write_measurement
 from stepdiag.io.whole_files import check_output
@@ -158,21 +159,54 @@ def _checked_raw_path(raw: Path | None, output: Path) -> Path:
 
 def instrument_of(source: str, known: Known, options: AcquireOptions, warn: Callable[[str], None]) -> Instrument:
     """The instrument of a source, not yet connected. Raises InvalidArgument."""
+    first, plus, second = source.partition(" + ")
+    if plus:
+        if known.head.layout not in ("psd", "ideal"):
+            raise InvalidArgument(
+                f'source: two instruments read distance and spot, or distance and tilts; a head "{known.head.layout}" '
+                "has beams"
+            )
+        options = replace(options, axes=options.axes or (1,))
+        distance, others = known.signals[:1], known.signals[1:]
+        one = _ids3010(first, list(distance), known, options)
+        return JoinedInstruments(one, line_instrument(second, known, timeout=options.timeout, warn=warn, only=others))
     kind = source.partition(":")[0]
-    if kind in ("lines", "program"):
+    if kind in ("lines", "program", "serial"):
         if options.axes is not None:
             raise InvalidArgument(f"axes: lines name their channels; only an IDS3010 has axes, got {source!r}")
         return line_instrument(source, known, timeout=options.timeout, warn=warn)
     if kind != "ids3010":
         raise InvalidArgument(
-            f"source: expected ids3010://HOST, lines://127.0.0.1:PORT or program:COMMAND, got {source!r}"
+            "source: expected ids3010://HOST, lines://127.0.0.1:PORT, serial:PORT or program:COMMAND, or an IDS3010 "
+            f"and one of the others with ' + ' between them, got {source!r}"
         )
-    channels = channels_of_axes(known)
-    axes = options.axes or tuple(range(1, len(channels) + 1))
+    return _ids3010(source, channels_of_axes(known), known, options)
+
+
+def _ids3010(source: str, channels: list[str], known: Known, options: AcquireOptions) -> Ids3010Instrument:
+    own = {line: head.keys.channels for line, head in known.described_heads.items() if head.keys.channels is not None}
+    if own and options.axes is not None:
+        raise InvalidArgument("axes: the scenario says in `channels` of its heads which axes they have; expected one")
+    by_line = {line: _axes_of_head(known, line, names, channels) for line, names in own.items()}
+    axes = options.axes or next(iter(by_line.values()), tuple(range(1, len(channels) + 1)))
     check_axes(axes, channels)
     host, port = parse_source(source)
     client = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
-    return Ids3010Instrument(client, channels, axes, start=options.start, start_timeout=options.start_timeout)
+    return Ids3010Instrument(
+        client, channels, axes, start=options.start, start_timeout=options.start_timeout, axes_by_line=by_line
+    )
+
+
+def _axes_of_head(known: Known, line: str, names: Sequence[str], channels: Sequence[str]) -> tuple[int, ...]:
+    place = f"{known.path}: {known.described_heads[line].place}.channels"
+    if not all(name.isdecimal() for name in names):
+        raise InvalidArgument(f'{place}: expected axes of the IDS3010 such as ["2"], got {list(names)!r}')
+    axes = tuple(int(name) for name in names)
+    try:
+        check_axes(axes, channels)
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{place}: {error}") from None
+    return axes
 
 
 @contextmanager

@@ -132,6 +132,7 @@ class Acquisition:
         columns, sign = self._instrument.columns, self._header.sign
         self._operator.cross = lambda sample: cross_of(head, frame, columns, sample.values, sign)
         if visit.number != begun:
+            self._instrument.use_line(visit.line)
             self._trigger.begin(visit, index, self._instruction(visit, begun))
         key = (visit.number, int(visit.points[index]))
         try:

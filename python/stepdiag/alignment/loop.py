@@ -49,6 +49,7 @@ class AlignmentLoop:
         conductor.cross = lambda sample: cross_of(head, frame, columns, sample.values, self._sign)
         state.turns, state.is_aligned = [], False
         state.limit_urad = 1e6 * float(np.hypot(limits.laser, limits.reflector))
+        instrument.use_line(visit.line)
         instrument.set_up(visit.set_up)
         conductor.tell(placement(known, visit).words)
         conductor.tell(

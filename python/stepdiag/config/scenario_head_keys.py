@@ -85,6 +85,14 @@ class NominalHeadKeys(Section):
         None,
         "coupled_mode",
     )
+    channels: tuple[Annotated[str, Field(min_length=1, max_length=60)], ...] | None = key(
+        "a list of names",
+        "How an instrument that serves several heads names the readings of this one, in the order of its channels: "
+        'axes of an IDS3010 such as "2", or what an adapter sends, units included. By default axes from 1 on, and the '
+        "channels' own names.",
+        None,
+        ["left_distance_mm"],
+    )
 
 
 class HeadKeys(NominalHeadKeys):

@@ -1,6 +1,6 @@
 """The attocube IDS3010 as the instrument of an acquisition."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Literal, Self
 
@@ -19,14 +19,17 @@ class Ids3010Instrument:
         *,
         start: Literal["auto", "never"] = "auto",
         start_timeout: float = 90.0,
+        axes_by_line: Mapping[str, Sequence[int]] | None = None,
     ) -> None:
-        """axes: the instrument's axis, from 1, of each channel. start: whether its measurement is started again where
-        it is stopped or warns at a set-up; that takes up to `start_timeout` seconds."""
+        """axes: the instrument's axis, from 1, of each channel; axes_by_line: of lines with heads of their own. start:
+        whether its measurement is started again where it is stopped or warns at a set-up; that takes up to
+        `start_timeout` seconds."""
         self.name = client.name
         self.columns = tuple(ReadColumn(channel, "pm") for channel in channels)
         self.axes = tuple(axes)
         self._client = client
         self._start, self._start_timeout = start, start_timeout
+        self._axes_by_line = axes_by_line or {}
         self._is_twin = False
 
     def __enter__(self) -> Self:
@@ -46,6 +49,9 @@ class Ids3010Instrument:
     def read(self) -> Sample:
         read = self._client.read([axis - 1 for axis in self.axes])
         return Sample(read.pm, tuple(self._client.error_text(number) if number else "" for number in read.warnings))
+
+    def use_line(self, line: str) -> None:
+        self.axes = tuple(self._axes_by_line.get(line, self.axes))
 
     def visit(self, number: int, index: int, digest: str) -> None:
         if self._is_twin:

@@ -106,7 +106,9 @@ class Sample:
 class Instrument(Protocol):
     """An instrument; inside a `with` block it is connected. Methods raise InstrumentError."""
 
-    name: str  # its source
+    @property
+    def name(self) -> str:
+        """Its source."""
 
     @property
     def columns(self) -> tuple[ReadColumn, ...]:
@@ -127,6 +129,9 @@ class Instrument(Protocol):
 
     def read(self) -> Sample:
         """Values that were taken after this call. Ends within the instrument's time limit."""
+
+    def use_line(self, line: str) -> None:
+        """From now on the head of this line is read, where the instrument serves several."""
 
     def visit(self, number: int, index: int, digest: str) -> None:
         """Called before the first reading of a visit: a simulated instrument goes there."""

@@ -7,7 +7,7 @@ import ipaddress
 import json
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from types import TracebackType
 from typing import Any, Final, Self
@@ -17,12 +17,13 @@ from stepdiag._core import InvalidArgument, newer_format
 from stepdiag.instruments.ids3010 import TWIN
 from stepdiag.instruments.ids3010_messages import shown
 from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Sample, columns_of_signals
-from stepdiag.instruments.line_streams import Connection, LineFeed, ProgramOutput, Stream
+from stepdiag.instruments.line_streams import BAUD, Connection, LineFeed, ProgramOutput, SerialPort, Stream
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.known import Known
 
 VERSION: Final = 1
 KEYS: Final = {"stepdiag_lines", "channels", "visits"}  # of the header; others are texts about the instrument
+_HEADER: Final = b'{"stepdiag_lines"'
 HEADER: Final = 10.0  # s to wait for the header at least: programs take a while to start
 LARGEST: Final = 1e9  # mm or urad
 AHEAD: Final = timedelta(minutes=1)  # by which an adapter's clock may be fast
@@ -88,10 +89,22 @@ class LineInstrument:
 
     axes: tuple[int, ...] = ()
 
-    def __init__(self, open_stream: Callable[[], Stream], known: Known, *, timeout: float) -> None:
-        """timeout: seconds to wait for a line."""
+    def __init__(
+        self,
+        open_stream: Callable[[], Stream],
+        known: Known,
+        *,
+        timeout: float,
+        only: Sequence[str] | None = None,
+        repeats: bool = False,
+    ) -> None:
+        """timeout: seconds to wait for a line. only: the channels of the head that it gives. repeats: the header comes
+        again and again, and lines before the first one are passed over."""
+        self._repeats = repeats
         self._open_stream, self._timeout = open_stream, timeout
-        self._known = known
+        self._known, self._only = known, only
+        self._names: tuple[str, ...] = ()  # of the values of a sample
+        self._used: tuple[int, ...] = ()  # of these, the columns of the line's head
         self.name = ""
         self._columns: tuple[ReadColumn, ...] = ()
         self._stream: Stream | None = None
@@ -112,7 +125,9 @@ class LineInstrument:
         self._feed = LineFeed(self._stream, self._take)
         try:
             self._feed.wait_for_first(max(self._timeout, HEADER))
-            if self._header is None:  # the line was no header
+            if self._repeats:
+                self._feed.wait(HEADER, lambda: self._header is not None, lambda: f"no header within {HEADER:g} s")
+            elif self._header is None:  # the line was no header
                 self._feed.wait(0.0, lambda: False, lambda: "expected a header")
         except BaseException:
             self._feed.close()
@@ -150,8 +165,15 @@ class LineInstrument:
 
         assert self._feed is not None
         self._feed.wait(self._timeout, lambda: self._newest is not None and is_new(), missing)
-        assert self._newest is not None
-        return self._newest
+        newest = self._newest
+        assert newest is not None
+        values = tuple(newest.values[place] for place in self._used)
+        return replace(newest, values=values, reasons=tuple(newest.reasons[place] for place in self._used))
+
+    def use_line(self, line: str) -> None:
+        own = self._known.described_heads[line].keys.channels
+        if own is not None:
+            self._used = tuple(self._names.index(name) for name in own)
 
     def visit(self, number: int, index: int, digest: str) -> None:
         assert self._header is not None
@@ -203,12 +225,22 @@ class LineInstrument:
 
     def _take(self, number: int, line: bytes) -> None:
         """Called by the feed, one line at a time."""
-        if self._header is None:
-            header = parse_header(line)
-            self._columns = columns_of_lines(self._known, header.columns)
+        if self._header is None or line.startswith(_HEADER):
+            try:
+                header = parse_header(line)
+            except ValueError:
+                if self._repeats:  # a line that began before we listened
+                    return
+                raise
+            if self._header is not None:
+                if not self._repeats or header != self._header:
+                    raise ValueError("a second header")
+                return
+            self._columns, self._names = columns_of_lines(self._known, header.columns, self._only)
+            self._used = tuple(range(len(self._columns)))
             self._header = header
             return
-        found = parse_sample(line, [column.name for column in self._columns])
+        found = parse_sample(line, self._names)
         if isinstance(found, Sample):
             self._newest = found
         elif isinstance(found, str):
@@ -217,16 +249,28 @@ class LineInstrument:
             self._at = found
 
 
-def columns_of_lines(known: Known, names: Sequence[str]) -> tuple[ReadColumn, ...]:
-    """The columns of a head, in its order, where these are their names. Raises ValueError.
+def columns_of_lines(
+    known: Known, names: Sequence[str], only: Sequence[str] | None = None
+) -> tuple[tuple[ReadColumn, ...], tuple[str, ...]]:
+    """The columns of a head, in its order, and how the adapter names them, where these are their names; of several
+    heads all names, those of the first head first. Raises ValueError.
 
     Of an ideal head the distance alone will do, for the conventional evaluation."""
-    columns = columns_of_signals(known.signals)
+    columns = columns_of_signals(known.signals if only is None else only)
     given, wanted = set(names), [column.name for column in columns]
     if known.head.layout == "ideal" and given == {"distance_mm"}:
-        return columns[:1]
+        return columns[:1], ("distance_mm",)
+    of_heads = [head.keys.channels for head in known.described_heads.values() if head.keys.channels is not None]
+    if of_heads:
+        for own in of_heads:
+            units = [name.rpartition("_")[2] for name in own]
+            if units != [column.unit for column in columns]:
+                raise ValueError(
+                    f"channels: expected names for {', '.join(wanted)}, units included, got {', '.join(own)}"
+                )
+        wanted = list(dict.fromkeys(name for own in of_heads for name in own))
     if given == set(wanted):
-        return columns
+        return columns, tuple(wanted)
     missing = [name for name in wanted if name not in given]
     unknown = [name for name in names if name not in wanted]
     told = [f"{what} {', '.join(which)[:200]}" for what, which in (("without", missing), ("with", unknown)) if which]
@@ -235,9 +279,24 @@ def columns_of_lines(known: Known, names: Sequence[str]) -> tuple[ReadColumn, ..
     )
 
 
-def line_instrument(source: str, known: Known, *, timeout: float, warn: Callable[[str], None]) -> LineInstrument:
-    """The instrument of "lines://HOST:PORT" or "program:COMMAND", not yet connected. Raises InvalidArgument."""
+def line_instrument(
+    source: str,
+    known: Known,
+    *,
+    timeout: float,
+    warn: Callable[[str], None],
+    only: Sequence[str] | None = None,
+) -> LineInstrument:
+    """The instrument of "lines://HOST:PORT", "serial:PORT" or "program:COMMAND", not yet connected. only: the channels
+    of the head that it gives. Raises InvalidArgument."""
     kind, _, rest = source.partition(":")
+    if kind == "serial":
+        device, _, speed = rest.partition("?baud=")
+        if not device or not (speed or "1").isdecimal():
+            raise InvalidArgument(f"source: expected serial:PORT or serial:PORT?baud=115200, got {source!r}")
+        return LineInstrument(
+            lambda: SerialPort(device, int(speed or BAUD)), known, timeout=timeout, only=only, repeats=True
+        )
     if kind == "program":
         try:
             arguments = shlex.split(rest)
@@ -246,11 +305,11 @@ def line_instrument(source: str, known: Known, *, timeout: float, warn: Callable
         if not arguments:
             raise InvalidArgument("source: expected program:COMMAND, got no command")
         name = f"program {arguments[0]}"
-        return LineInstrument(lambda: ProgramOutput(name, arguments), known, timeout=timeout)
+        return LineInstrument(lambda: ProgramOutput(name, arguments), known, timeout=timeout, only=only)
     host, port = _address(source)
     if not _is_loopback(host):
         warn(f"warning: {source}: not on this computer: anybody on the way can change the readings")
-    return LineInstrument(lambda: Connection(source, host, port, timeout), known, timeout=timeout)
+    return LineInstrument(lambda: Connection(source, host, port, timeout), known, timeout=timeout, only=only)
 
 
 def _address(source: str) -> tuple[str, int]:

@@ -20,6 +20,7 @@ PIECE: Final = 2**16  # bytes read at once
 PIECES: Final = 16  # in a row, before others have their turn
 BEHIND: Final = 2.0  # s for which there may always be more to read: then the sender is too fast
 QUOTED: Final = 1000  # characters of a program's standard error
+BAUD: Final = 115200  # of a serial port, where none is stated
 PATIENCE: Final = 2.0  # s until a program that closed its output has ended
 GRACE: Final = 0.5  # s that a program has to end by SIGTERM; below what Ctrl-C gives to the acquisition
 
@@ -62,6 +63,39 @@ class Connection:
 
     def close(self) -> None:
         self._socket.close()
+
+
+class SerialPort:
+    """A serial port on which lines come. Raises InvalidArgument without pyserial, InstrumentError."""
+
+    def __init__(self, port: str, speed: int) -> None:
+        try:
+            import termios
+
+            import serial  # type: ignore[import-untyped]
+        except ImportError:
+            raise InvalidArgument("serial: needs pyserial: pip install 'stepdiag[serial]'") from None
+        self.name = f"serial:{port}"
+        try:
+            self._port = serial.Serial(port, speed, timeout=0, write_timeout=1.0, exclusive=True)
+            os.set_blocking(self._port.fileno(), False)
+            attributes = termios.tcgetattr(self._port.fileno())
+            attributes[6][termios.VMIN] = 1  # a read without bytes is the end of the port, not a pause
+            termios.tcsetattr(self._port.fileno(), termios.TCSANOW, attributes)
+        except (serial.SerialException, termios.error, OSError, ValueError) as error:
+            raise InstrumentError(f"{self.name}: cannot be opened: {error}") from None
+
+    def fileno(self) -> int:
+        return int(self._port.fileno())
+
+    def send(self, line: bytes) -> None:
+        self._port.write(line)
+
+    def ended(self) -> str:
+        return "the port was closed"
+
+    def close(self) -> None:
+        self._port.close()
 
 
 class ProgramOutput:

@@ -382,7 +382,8 @@ def test_program_that_fails_is_quoted(tmp_path: Path) -> None:
         ("program:", "expected program:COMMAND, got no command"),
         ("program:'", "No closing quotation"),
         ("program:no-such-program", "no-such-program: cannot be started: No such file"),
-        ("serial:/dev/ttyUSB0", "expected ids3010://HOST, lines://127.0.0.1:PORT or program:COMMAND"),
+        ("serial:/dev/nowhere", "cannot be opened"),
+        ("usb:1", "expected ids3010://HOST, lines://127.0.0.1:PORT, serial:PORT or program:COMMAND"),
     ],
 )
 def test_sources_that_make_no_sense_are_refused(tmp_path: Path, source: str, message: str) -> None:
