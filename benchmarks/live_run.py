@@ -172,9 +172,8 @@ def measure(folder: Path, steps: int) -> None:
     assert not any(reading.is_lost for reading in readings.values())
     count = len(visit.points) - 2
     print(f"from beam to page: median {1e3 * statistics.median(delays):.0f} ms, longest {1e3 * max(delays):.0f} ms")
-    print(
-        f"{count / took:.0f} readings a second, {count} in all ({count * SECONDS_A_READING / 3600.0:.1f} h of a machine)"
-    )
+    hours = count * SECONDS_A_READING / 3600.0
+    print(f"{count / took:.0f} readings a second, {count} in all ({hours:.1f} h of a machine)")
     for k, name in enumerate(("acquire", "app, two pages")):
         load = (after[k][0] - before[k][0]) / took
         sizes = ", ".join(f"{one[k][1]:.0f}" for one in (*memory, after))

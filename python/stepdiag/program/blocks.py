@@ -126,11 +126,10 @@ class Body:
             f"the mirror, direction {_triple(np.round(towards, 6))}; the mirror faces it",
             f"the steps lead the mirror {width:.4g} mm and {height:.4g} mm across the beam, in local x and y",
         ]
+        stop = f"set-up {visit.set_up} of {count}: head and mirror for {what} {visit.line}, then cycle start"
         return [
             *(line for text in details for line in writer.comment(text)),
-            *writer.stop(
-                f"set-up {visit.set_up} of {count}: head and mirror for {what} {visit.line}, then cycle start"
-            ),
+            *(writer.stop(stop) if self.options.stops else []),
         ]
 
     def _head(self, line: str) -> str:

@@ -50,9 +50,9 @@ def measuring_program(known: Known, options: Options) -> Program:
     writer, trigger = writer_of(options), trigger_of(options)
     space = space_of(known, options)
     visits = list(visits_of(known))
-    actions = list(actions_of(visits, space, align=options.align))
+    actions = list(actions_of(visits, space, align=options.align and options.stops))
     unlike = otherwise(approaches(actions, writer), space.overrun, writer)
-    seconds, set_up_seconds = _duration(actions, space, times)
+    seconds, set_up_seconds = _duration(actions, space, times, stops=options.stops)
     program = Program(
         text="",
         readings=sum(len(visit.points) for visit in visits),
@@ -86,7 +86,7 @@ def _rounding(actions: list[Action], writer: Writer) -> float:
     return float(np.max(np.abs(written - positions)))
 
 
-def _duration(actions: list[Action], space: Space, times: Times) -> tuple[float, float]:
+def _duration(actions: list[Action], space: Space, times: Times, *, stops: bool) -> tuple[float, float]:
     """Total time and time for set-ups, s; all moves at the feed."""
     place, seconds, set_ups = space.safe.copy(), 0.0, 0.0
     for action in actions:
@@ -100,7 +100,7 @@ def _duration(actions: list[Action], space: Space, times: Times) -> tuple[float,
             place = there
         elif isinstance(action, Read):
             seconds += times.settle + times.measure
-        elif isinstance(action, SetUp):
+        elif isinstance(action, SetUp) and stops:
             set_ups += times.scale_line_change if action.visit.is_scale_line else times.line_change
     return seconds + set_ups, set_ups
 

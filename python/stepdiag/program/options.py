@@ -52,6 +52,7 @@ class Options:
         None, "Decimal places of positions in mm.  [default: 6 for linuxcnc, 4 for iso]", metavar="N"
     )
     align: bool = option(True, "Stop at the first point of a line to align the beam.")
+    stops: bool = option(True, "Stop before each line to set up head and mirror; not where all heads stay installed.")
     line_numbers: bool = option(False, "Number the blocks (iso).")
 
 

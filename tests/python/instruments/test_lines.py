@@ -382,7 +382,7 @@ def test_program_that_fails_is_quoted(tmp_path: Path) -> None:
         ("program:", "expected program:COMMAND, got no command"),
         ("program:'", "No closing quotation"),
         ("program:no-such-program", "no-such-program: cannot be started: No such file"),
-        ("serial:/dev/nowhere", "cannot be opened"),
+        ("serial:", "expected serial:PORT"),
         ("usb:1", "expected ids3010://HOST, lines://127.0.0.1:PORT, serial:PORT or program:COMMAND"),
     ],
 )

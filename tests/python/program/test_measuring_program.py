@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gcode import LETTERS, Trace, trace
+from places import EXAMPLES
 
 from stepdiag import InvalidArgument
 from stepdiag.cli import main
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.program.measuring_program import Program, measuring_program
 from stepdiag.program.options import Options
-from stepdiag.scenario.description import parse_scenario
+from stepdiag.scenario.description import parse_scenario, read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import visits_of
 
@@ -256,3 +257,17 @@ def test_a_file_name_cannot_leave_its_comment() -> None:
     assert not any(line.lower().startswith(("(py", "(msg", "(debug")) for line in head)
     iso = measuring_program(scenario, Options(dialect="iso")).text
     assert iso.count("%") == 2
+
+
+def test_program_for_heads_that_stay_installed_never_stops() -> None:
+    known = read_scenario(EXAMPLES / "scenario.toml").known
+    program = measuring_program(known, Options(stops=False))
+    blocks = program.text.splitlines()
+    assert not [block for block in blocks if block in ("M0", "M1")]  # the handshake's own is where nobody answers
+    assert program.set_up_seconds == 0.0
+    stopping = measuring_program(known, Options())
+    assert program.readings == stopping.readings
+    assert program.seconds == pytest.approx(stopping.seconds - stopping.set_up_seconds)
+    assert len([block for block in blocks if block.startswith("G53 G1")]) == len(
+        [block for block in stopping.text.splitlines() if block.startswith("G53 G1")]
+    )
