@@ -117,8 +117,7 @@ class RawTail:
 class LiveRuns:
     """Starts them. Those that run when the server ends go on."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self) -> None:
         self._children: list[subprocess.Popen[bytes]] = []
 
     def begin(self, run: LiveRun, words: Sequence[str]) -> None:
@@ -136,7 +135,7 @@ class LiveRuns:
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
-                    cwd=self._folder,
+                    cwd=run.raw.parent,
                     env=quiet_environment(),
                     **OWN_GROUP,
                 )

@@ -64,7 +64,7 @@ class App:
     def __init__(self, book: Path, temporary: Path) -> None:
         self._folder, self._temporary = book.absolute(), temporary
         self.jobs = Jobs()
-        self.live = LiveRuns(self._folder)
+        self.live = LiveRuns()
         self._drawn: dict[str, asyncio.Lock] = {}
 
     # --- what is there ----------------------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ class App:
             common += ["--watched", *_options(given, ("source",))]
             if what == "align":
                 run = LiveRun(machine, ALIGNMENT)
-                words = ["align", *common, "--live", str(run.raw)]
+                words = ["align", *common]
             else:
                 name = await asyncio.to_thread(_free, machine, "runs", date_of_today()[:10], ".csv")
                 run = LiveRun(machine, Path(name).stem)

@@ -80,7 +80,14 @@ FOLDERS = {("demo", "output"), ("init", "output"), ("export", "output")}
 # Every parameter that names a file to read.
 INPUTS = {
     *{(name, "scenario") for name in ("simulate", "evaluate", "observe", "plan", "uncertainty", "nc")},
-    *{("acquire", "scenario"), ("acquire", "from_raw"), ("twin", "scenario"), ("init", "scenario"), ("study", "file")},
+    *{
+        ("acquire", "scenario"),
+        ("acquire", "from_raw"),
+        ("align", "scenario"),
+        ("twin", "scenario"),
+        ("init", "scenario"),
+        ("study", "file"),
+    },
     *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
     *{("import", "files"), ("import", "scenario"), ("evaluate", "run")},
     *{("compare", "a"), ("compare", "b"), ("positions", "file")},

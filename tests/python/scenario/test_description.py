@@ -178,6 +178,7 @@ MALFORMED = [
     ('"ideal"', '"psd"\npsd_distance_mm = -100', "head: head psd_distance: expected"),
     ('"ideal"', '"multi_beam"', 'head.beam_offsets_mm: missing; the layout "multi_beam" needs it'),
     ('"ideal"', '"multi_beam"\nbeam_offsets_mm = [[0, 0], [1, 1], [2, 2]]', "head: head beam_offsets: expected three or more beams that are not on one line"),
+    ('"ideal"', '"ideal"\nchannels = [""]', "head.channels: expected a list of names"),
     ('"ideal"', '"ideal"\nmirror_mm = [10, 10]', "head.mirror_mm: too small for this plan: expected at least [19.2, 17.9], got [10.0, 10.0]"),
     # TOML
     ("[noise]", "[noise", "not valid TOML: expected ']' at the end of a table declaration (at line 24, column 7)"),

@@ -28,13 +28,11 @@ from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, made_of, options_of, t
 @click.option("--line", "lines", multiple=True, metavar="LINE", help="Only this line; may be given again.")
 @options_of(AcquireOptions, only=("axes", "sign", "timeout"))
 @click.option(
-    "--live",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Raw file beside which others may watch.",
+    "--watched",
+    is_flag=True,
+    help="Questions are answered by whoever watches .align.live.json, not at standard input.",
 )
-@click.option("--watched", is_flag=True, help="Questions are answered by whoever watches, not at standard input.")
-def align(scenario: Path, source: str, lines: tuple[str, ...], live: Path | None, watched: bool, **given: Any) -> None:
+def align(scenario: Path, source: str, lines: tuple[str, ...], watched: bool, **given: Any) -> None:
     """Align head and mirror of SCENARIO's lines, one after the other.
 
     Says where both go, reads at four places of the machine, and says what to turn until laser and
@@ -56,7 +54,7 @@ def align(scenario: Path, source: str, lines: tuple[str, ...], live: Path | None
     with (
         unwinding(),
         instrument_of(source, known, options, operator.tell) as instrument,
-        Conductor(instrument, operator, live, options.sign) as conductor,
+        Conductor(instrument, operator, Path("align.raw.jsonl") if watched else None, options.sign) as conductor,
     ):
         settling = Settling(count=3, average=5)
         found = AlignmentLoop(known, instrument, conductor, settling, options.sign).run(chosen)
