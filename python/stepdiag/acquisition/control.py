@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -30,12 +31,10 @@ class ControlFile:
     """Reads what was appended since it was opened."""
 
     def __init__(self, path: Path) -> None:
-        """What an earlier acquisition was asked for is gone. Raises InvalidArgument."""
+        """What an earlier acquisition was asked for is gone. Where the file cannot be made, nobody can ask."""
         self._path, self._read = path, 0
-        try:
+        with suppress(OSError):
             path.write_bytes(b"")
-        except OSError as error:
-            raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
 
     def new(self) -> Iterator[tuple[Control, str]]:
         """What was asked for, and the text that goes with it. Lines that say nothing known are passed over."""

@@ -8,12 +8,10 @@ programs may read it at any time.
 import json
 import os
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Self
-
-from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import reason
 
 Doing = Literal["begins", "waits", "reads", "asks", "paused", "ended"]
 
@@ -89,27 +87,26 @@ class LiveFile:
     """Publishes a state. What cannot be written is not published; the acquisition goes on."""
 
     def __init__(self, path: Path) -> None:
-        """Raises InvalidArgument."""
         self.path = path
         self._number = 0
-        try:
+        self._handle: int | None = None
+        with suppress(OSError):
             self._handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        except OSError as error:
-            raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
 
     def publish(self, state: LiveState) -> None:
+        if self._handle is None:
+            return
         self._number += 1
         content = {"version": VERSION, "number": self._number, **asdict(state), "whole": self._number}
         text = json.dumps(content, separators=(",", ":")).encode()
         if len(text) >= ROOM:
             text = json.dumps({**content, "messages": []}, separators=(",", ":")).encode()
-        try:
+        with suppress(OSError):
             os.pwrite(self._handle, text[: ROOM - 1].ljust(ROOM - 1) + b"\n", 0)
-        except OSError:
-            return
 
     def close(self) -> None:
-        os.close(self._handle)
+        if self._handle is not None:
+            os.close(self._handle)
 
     def __enter__(self) -> Self:
         return self

@@ -184,7 +184,10 @@ def folder(made: Made, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def content(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    """Without what an acquisition shows to others."""
+    found = [path for path in folder.rglob("*") if path.is_file()]
+    shown = (".live.json", ".control.jsonl")
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found if not path.name.endswith(shown)}
 
 
 @contextmanager
