@@ -61,8 +61,11 @@ CHANGES = (
     "/machines/VMC-1200/files?name=a.csv",
     "/machines/VMC-1200/evaluate",
     "/machines/VMC-1200/remove",
+    "/machines/VMC-1200/begin",
+    "/machines/VMC-1200/live/align/control",
 )
 SCREENS = ("/", "/machines/VMC-1200", "/machines/VMC-1200/file/runs/run.csv", "/search?q=a", "/static/app.js")
+SCREENS += ("/machines/VMC-1200/measure", "/machines/VMC-1200/live/align", "/machines/VMC-1200/live/align/events")
 
 
 @pytest.mark.parametrize("address", SCREENS)
@@ -421,3 +424,41 @@ def test_figures_follow_the_limit_of_the_machine(person: TestClient) -> None:
     about = MACHINE / "machine.toml"
     about.write_text(about.read_text().replace("limit_um = 20.0", "limit_um = 35.0"))
     assert "Is the machine within 35" in person.get(figures).text
+
+
+# --- measuring -------------------------------------------------------------------------------------------------------
+def test_page_starts_no_program_and_no_unknown_scenario(person: TestClient) -> None:
+    scenario = next(path.name for path in (Path(MACHINE) / "scenarios").iterdir())
+    given = {"what": "acquire", "scenario": f"scenarios/{scenario}", "trigger": "key"}
+    answer = person.post("/machines/VMC-1200/begin", data={**given, "source": "program:touch owned"})
+    assert answer.status_code == 404
+    assert "starts no programs" in answer.text
+    for wrong in ("../scenario.toml", "/etc/passwd", "runs/run.csv/.."):
+        answer = person.post(
+            "/machines/VMC-1200/begin", data={**given, "scenario": wrong, "source": "lines://127.0.0.1:1"}
+        )
+        assert answer.status_code == 404
+    assert not Path("owned").exists()
+
+
+@pytest.mark.parametrize("name", ["%2e%2e", ".", "../../x", "run%00", "nothing"])
+def test_only_what_was_measured_can_be_watched(person: TestClient, name: str) -> None:
+    for path in ("", "/events"):
+        assert person.get(f"/machines/VMC-1200/live/{name}{path}").status_code in (404, 405)
+    assert person.post(f"/machines/VMC-1200/live/{name}/control", data={"control": "stop"}).status_code in (404, 405)
+
+
+def test_alignment_that_cannot_begin_says_why(person: TestClient) -> None:
+    scenario = next(path.name for path in (Path(MACHINE) / "scenarios").iterdir())
+    given = {"what": "align", "scenario": f"scenarios/{scenario}", "source": "lines://127.0.0.1:1"}
+    answer = person.post("/machines/VMC-1200/begin", data=given)
+    assert answer.status_code == 303
+    page = answer.headers["location"]
+    until = time.monotonic() + 30.0
+    while "cannot be reached" not in (said := person.get(page).text):
+        assert time.monotonic() < until, said
+        time.sleep(0.1)
+    assert person.get("/machines/VMC-1200/measure").status_code == 200
+    control = page.partition("?")[0] + "/control"
+    assert person.post(control, data={"control": "explode"}).status_code == 404
+    assert "no acquisition is running" in person.post(control, data={"control": "stop"}).text
