@@ -49,6 +49,7 @@ class LiveState:
     values: dict[str, float | None] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)  # why values are missing
     signal: dict[str, float] = field(default_factory=dict)
+    conditions: dict[str, float] = field(default_factory=dict)  # temperatures and air, by column
     cross_urad: list[float] | None = None  # the mirror against the beam, see cross.py
     limit_urad: float | None = None  # of that, while head and mirror are aligned
     turns: list[str] = field(default_factory=list)  # what to turn, while they are aligned

@@ -239,6 +239,9 @@ class Acquisition:
     def _new_temperatures(self) -> list[TemperatureRow]:
         rows = [] if self._temperatures is None else self._temperatures.new_rows()
         self.recorded += rows
+        if rows:
+            known = {name: value for name, value in rows[-1].values.items() if value is not None}
+            self._operator.state.conditions |= {str(name): value for name, value in known.items()}
         return rows
 
     def _tell_lost(self, visit: Visit, index: int, reading: RawReading) -> None:

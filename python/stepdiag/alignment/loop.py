@@ -18,7 +18,14 @@ from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit
 
 OVERLOAD: Final = 850.0  # per mille of contrast and baseline together, above which the signal may be too large
-PLACES: Final = ("near the head", "a little aside", "a little aside, the other way", "far from the head")
+PLACES: Final = (
+    "near the head",
+    "a little aside of it",
+    "aside the other way",
+    "far from the head",
+    "a little aside of it",
+    "aside the other way",
+)
 
 
 class AlignmentLoop:

@@ -1,4 +1,4 @@
-"""Where the machine goes to show how head and mirror stand: near the head, a little aside from there, and far away.
+"""Where the machine goes to show how head and mirror stand: near the head, far from it, and a little aside of both.
 
 Along the line the readings show the mirror against the laser. Aside, the distance shows the mirror against the machine:
 by a shift s across the beam it changes by s times the mirror's tilt. So both are known.
@@ -21,14 +21,14 @@ LEAST: Final = 0.2  # share of a move across the beam, for one that is of use
 
 
 def alignment_places(known: Known, visit: Visit) -> FloatArray:
-    """Positions of the axes (4, 3), mm: near, aside twice, far. Raises InvalidArgument where the volume has no room."""
+    """Positions of the axes (6, 3), mm: near, aside twice, far, aside twice. Raises InvalidArgument where the volume has
+    no room."""
     plan, frame = known.plan, np.asarray(known.plan.frame(visit.line))
     near, far = np.asarray(visit.positions[0]), np.asarray(visit.positions[-1])
     if visit.direction == "backward":
         near, far = far, near
     volume = np.asarray(plan.volume)
-    inward = np.where(near > volume / 2.0, -1.0, 1.0)
-    across = frame[:, :2].T * inward  # (2, 3) by a move of 1 mm along each axis, inward
+    across = frame[:, :2].T  # (2, 3) by a move of 1 mm along each axis
     edge = np.asarray(mirror_of(known, visit)).min()
     pairs = [
         (abs(float(np.linalg.det(across[:, pair]))), pair)
@@ -38,11 +38,14 @@ def alignment_places(known: Known, visit: Visit) -> FloatArray:
     if not pairs:
         raise InvalidArgument(f"line {visit.line}: expected axes that move across the beam")
     _, best = max(pairs, key=lambda found: round(found[0], 9))
-    moved = []
-    for axis in best:
-        step = min(SHARE * edge / float(np.linalg.norm(across[:, axis])), float(volume[axis]) / 2.0)
-        moved.append(near + inward * step * np.eye(3)[axis])
-    return np.array([near, *moved, far])
+    found = []
+    for place in (near, far):
+        found.append(place)
+        for axis in best:
+            step = min(SHARE * edge / float(np.linalg.norm(across[:, axis])), float(volume[axis]) / 2.0)
+            inward = -1.0 if place[axis] > volume[axis] / 2.0 else 1.0
+            found.append(place + inward * step * np.eye(3)[axis])
+    return np.array(found)
 
 
 def mirror_of(known: Known, visit: Visit) -> tuple[float, float]:

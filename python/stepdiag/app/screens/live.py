@@ -87,6 +87,7 @@ def _reading(aligns: bool) -> Markup:
         element("p", "", id="beside", class_="quiet"),
         element("p", "", id="where"),
         element("p", "", id="signal", class_="quiet"),
+        element("p", "", id="conditions", class_="quiet"),
     ]
     return element("section", *parts, aria_label="Reading", class_="reading")
 

@@ -4,7 +4,8 @@
 /**
  * @typedef {{doing: string, failure: string, question: string, answers: string[], asked: number, visit: number, visits: number,
  *   set_up: number, line: string, run: number, direction: string, index: number, points: number, point: number,
- *   position_mm: number[], reasons: string[], signal: Record<string, number>, from_nominal_um: number | null,
+ *   position_mm: number[], reasons: string[], signal: Record<string, number>,
+ *   conditions: Record<string, number>, from_nominal_um: number | null,
  *   distance_mm: number | null, cross_urad: number[] | null, limit_urad: number | null, turns: string[],
  *   is_aligned: boolean, readings: number, lost: number, planned: number, minutes_left: number | null,
  *   messages: [number, number, string][]}} LiveState
@@ -23,6 +24,15 @@ const ANSWERS = /** @type {Record<string, string>} */ ({
   confirm: "Yes, go on",
   repeat_point: "Measure again",
   keep: "Leave it as it is",
+});
+const CONDITIONS = /** @type {Record<string, string>} */ ({
+  temperature_c: "scales, °C",
+  temperature_x_c: "scale X, °C",
+  temperature_y_c: "scale Y, °C",
+  temperature_z_c: "scale Z, °C",
+  air_temperature_c: "air, °C",
+  air_pressure_hpa: "pressure, hPa",
+  air_humidity_percent: "humidity, %",
 });
 const SMALL = 10_000; // µm from nominal, beyond which the distance itself is shown
 const NAMESPACE = "http://www.w3.org/2000/svg";
@@ -108,6 +118,8 @@ class LivePage {
       write("where", this.aligns ? where : `${where}, point ${state.point} (${state.index + 1} of ${state.points}): ${at} mm`);
     }
     write("signal", Object.entries(state.signal).map(([name, value]) => `${name} ${local(value, 0)} ‰`).join(", "));
+    const conditions = Object.entries(state.conditions).map(([name, value]) => `${CONDITIONS[name] ?? name} ${local(value, 2)}`);
+    write("conditions", conditions.join(", "));
     const bar = /** @type {HTMLProgressElement | null} */ (place("share"));
     if (bar) bar.value = state.planned ? state.readings / state.planned : 0;
     const left = state.minutes_left === null ? "" : `, about ${local(state.minutes_left, 0)} min left`;

@@ -35,7 +35,7 @@ from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, made_of, options_of, t
 def align(scenario: Path, source: str, lines: tuple[str, ...], watched: bool, **given: Any) -> None:
     """Align head and mirror of SCENARIO's lines, one after the other.
 
-    Says where both go, reads at four places of the machine, and says what to turn until laser and
+    Says where both go, reads at six places of the machine, and says what to turn until laser and
     mirror are within what the plan takes for granted. Nothing is written.
     """
     from stepdiag.acquisition.acquire import instrument_of
