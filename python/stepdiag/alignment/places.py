@@ -21,8 +21,8 @@ LEAST: Final = 0.2  # share of a move across the beam, for one that is of use
 
 
 def alignment_places(known: Known, visit: Visit) -> FloatArray:
-    """Positions of the axes (6, 3), mm: near, aside twice, far, aside twice. Raises InvalidArgument where the volume has
-    no room."""
+    """Positions of the axes (6, 3), mm: near, aside twice, far, aside twice. Raises InvalidArgument for a line across
+    which no axis moves."""
     plan, frame = known.plan, np.asarray(known.plan.frame(visit.line))
     near, far = np.asarray(visit.positions[0]), np.asarray(visit.positions[-1])
     if visit.direction == "backward":

@@ -153,7 +153,7 @@ def test_command_names_the_lines_that_are_not_aligned(
         said = capsys.readouterr()
         assert "line p00 is aligned" in said.out
         assert "laser: turn it" in said.out
-        assert said.err == "stepdiag: warning: not aligned: ppp\n"
+        assert said.err == "warning: not aligned: ppp\n"
         assert main(["align", "scenario.toml", "--source", twin.source, "--line", "xyz"]) == 2
         assert "--line: expected lines of the plan, got 'xyz'" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["scenario.toml"]
