@@ -179,7 +179,9 @@ class LivePage {
     spot.classList.toggle("out", state.limit_urad !== null && !within);
     place("cross-limit")?.setAttribute("visibility", state.limit_urad === null ? "hidden" : "visible");
     const words = state.limit_urad === null ? "" : within ? `, within ${local(limit, 0)}` : `, above ${local(limit, 0)}`;
-    write("cross-said", `Mirror against the beam: ${local(right, 0)} µrad right, ${local(up, 0)} up${words}`);
+    const sideways = `${local(Math.abs(right), 0)} µrad ${right < 0 ? "left" : "right"}`;
+    const upward = `${local(Math.abs(up), 0)} ${up < 0 ? "down" : "up"}`;
+    write("cross-said", `Mirror against the beam: ${sideways}, ${upward}${words}`);
   }
 
   /** @param {LiveState} state */

@@ -178,7 +178,10 @@ def _alignment_line(state: LiveState) -> str:
         right, up = state.cross_urad
         size = (right**2 + up**2) ** 0.5
         word = "within" if size <= (state.limit_urad or 0.0) else "above"
-        parts.append(f"mirror to beam {right:+.0f} right, {up:+.0f} up µrad, {word} {state.limit_urad:.0f}")
+        sideways, upward = ("left" if right < 0.0 else "right"), ("down" if up < 0.0 else "up")
+        parts.append(
+            f"mirror to beam {abs(right):.0f} µrad {sideways}, {abs(up):.0f} {upward}, {word} {state.limit_urad:.0f}"
+        )
     if state.distance_mm is not None:
         parts.append(f"{state.distance_mm:.4f} mm")
     parts += [f"{name} {value:.0f}" for name, value in state.signal.items()]
