@@ -34,7 +34,7 @@ const CONDITIONS = /** @type {Record<string, string>} */ ({
   air_pressure_hpa: "pressure, hPa",
   air_humidity_percent: "humidity, %",
 });
-const SMALL = 10_000; // µm from nominal, beyond which the distance itself is shown
+const SMALL = 1_000; // µm from nominal, beyond which the distance itself is shown
 const NAMESPACE = "http://www.w3.org/2000/svg";
 
 /** @param {string} id @returns {HTMLElement | null} */

@@ -159,7 +159,7 @@ def status_line(state: LiveState) -> str:
     bar = "█" * done + "·" * (BAR - done)
     if state.reasons:
         beside = f"NO BEAM ({state.reasons[0]})" if state.distance_mm is None else state.reasons[0]
-    elif state.from_nominal_um is not None and abs(state.from_nominal_um) < 1e4:
+    elif state.from_nominal_um is not None and abs(state.from_nominal_um) < 1e3:
         beside = f"{state.from_nominal_um:+9.3f} µm from nominal"
     else:
         beside = "" if state.distance_mm is None else f"{state.distance_mm:.4f} mm"
