@@ -1,5 +1,6 @@
 """How values show themselves: one line in a console (`repr`), a small table in a notebook (`_repr_html_`)."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -97,3 +98,16 @@ def lines_text(plan: Any) -> str:
 
 def _read_at(plan: Any) -> str:
     return " at every step" if plan.scale_points == "steps" else ""
+
+
+# Control characters, which a terminal obeys, and those that turn the direction of writing. They come from files.
+_DIRECTIONS: Final = "\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+_UNSEEN: Final = re.compile(f"[\x00-\x1f{_DIRECTIONS}]")
+_UNSEEN_IN_TEXTS: Final = re.compile(f"[\x00-\x08\x0b\x0c\x0e-\x1f{_DIRECTIONS}]")
+
+
+def visible(text: str, *, lines: bool = False) -> str:
+    """A text that leaves the program, for a terminal, a page or a file: what nobody would see stands escaped, such as
+    \\x1b. lines: line feeds and tabulators stay."""
+    unseen = _UNSEEN_IN_TEXTS if lines else _UNSEEN
+    return unseen.sub(lambda found: found[0].encode("unicode_escape").decode(), text)

@@ -25,7 +25,7 @@ BELOW: dict[str, set[str]] = {
     "option_field": set(),
     "findings": {"parameters", "setup_quantities"},
     "calibration": {"findings", "style", "display", "wrong_arguments"},
-    "io": {"config", "calibration", "interruption", "memory"},
+    "io": {"config", "calibration", "display", "interruption", "memory"},
     "positions": {"io"},
     "head": {"io"},
     "scenario": {"head"},

@@ -3,7 +3,9 @@
 Imports inside the commands keep the other commands fast.
 """
 
+import errno
 import io
+import os
 import sys
 from importlib import import_module
 from typing import Final
@@ -89,6 +91,14 @@ def _complain(message: str) -> None:
     tell("error", message)
 
 
+def _words_of(error: OSError) -> str:
+    """Where it has no file, it was standard output: files are written by functions that name them."""
+    if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG):
+        why = os.strerror(error.errno)
+        return f"standard output: {why}: what the command says was not written, what it wrote to files was"
+    return str(error)
+
+
 def run(arguments: list[str] | None) -> int:
     """Run the command line and return the exit code. None: the arguments of the process.
 
@@ -114,7 +124,7 @@ def run(arguments: list[str] | None) -> int:
         _complain(f"{error}; nothing was written (verified_share = 1 traces every pose)")
         return 1
     except OSError as error:
-        _complain(str(error))
+        _complain(_words_of(error))
     except MemoryError as error:
         _complain(str(error) if isinstance(error, NotEnoughMemory) else "the memory does not suffice")
     return 2

@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import click
 
+from stepdiag.display import visible
+
 WIDEST: Final = 100  # columns
 LONGEST: Final = 2000  # characters; no line of ours is longer, but a file may have a line of 50 MB
 _SAID_AT_THE_END: Final = 500  # of these: what was expected, as a rule
-# Control characters, which a terminal obeys, and those that turn the direction of writing. They come from files.
-_CONTROLS: Final = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 _GOOD: Final = {"fg": "green"}
 _UNSURE: Final = {"fg": "yellow"}
 _BAD: Final = {"fg": "red", "bold": True}
@@ -52,7 +52,7 @@ def plain(text: str) -> str:
     """The text with its control characters escaped, such as \\x1b, and at most LONGEST characters of it."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST - _SAID_AT_THE_END - 3]} … {text[-_SAID_AT_THE_END:]}"
-    return _CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    return visible(text)
 
 
 def wants_colour(stream: Any) -> bool:

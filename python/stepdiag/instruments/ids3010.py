@@ -3,6 +3,7 @@
 docs/acquisition.md names the sources of the protocol and what was not tried on an instrument.
 """
 
+import re
 import socket
 import time
 from collections.abc import Sequence
@@ -26,6 +27,7 @@ TWIN: Final = "stepdiag twin"  # device type that a twin reports
 # Prefix of the functions' names: the first up to firmware 1.8, the second in 1.9.1.
 INTERFACES: Final = ("com.attocube.ids", "com.attocube.sen")
 LARGEST_POSITION: Final = 2**63  # pm
+FOREIGN: Final = 100  # replies with other ids before one; some may be late
 
 
 class _Refused(InstrumentError):
@@ -115,7 +117,10 @@ class Ids3010:
 
     def mode(self) -> str:
         """Return the mode: "system idle", "measurement starting", "measurement running", ..."""
-        return self._word("system.getCurrentMode")
+        mode = self._word("system.getCurrentMode")
+        if not re.fullmatch(r"[ -~]{1,60}", mode):
+            raise InstrumentError(f"{self.name}: system.getCurrentMode: expected a mode in words, got {_short(mode)}")
+        return mode
 
     def describe(self) -> dict[str, str]:
         """Return type, firmware and serial number, as far as the instrument reports them."""
@@ -230,6 +235,8 @@ class Ids3010:
                 if reply.get("id") == self._id:
                     return self._result(reply, method)
                 others += 1
+            if others > FOREIGN:
+                raise InstrumentError(f"{self.name}: {method}: more than {FOREIGN} replies with other ids")
 
     def _connected(self) -> socket.socket:
         if self._socket is None:

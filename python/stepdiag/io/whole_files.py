@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
+from stepdiag.display import visible
 from stepdiag.interruption import at_end, uninterrupted
 
 # No scenario is larger. The limit also ends the reading of an endless device.
@@ -100,7 +101,9 @@ def check_input(path: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes | memoryview) -> None:
-    """Write a file: `path` is either the old or the complete new one, on disk when this returns."""
+    """Write a file: `path` is either the old or the complete new one, on disk when this returns.
+
+    What nobody would see in a text, such as escapes that came from another file, stands escaped (`visible`)."""
     with _whole_file(path) as handle:
         _write_all(handle, content)
 
@@ -147,7 +150,7 @@ def _whole_file(path: Path) -> Iterator[int]:
 
 
 def _write_all(handle: int, content: str | bytes | memoryview) -> None:
-    rest = memoryview(content.encode() if isinstance(content, str) else content)
+    rest = memoryview(visible(content, lines=True).encode() if isinstance(content, str) else content)
     while rest:
         rest = rest[os.write(handle, rest) :]
 

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Final
@@ -19,7 +20,7 @@ from stepdiag.wrong_arguments import checked
 
 _REQUIRED: Final = ("target_mm", "direction", "cycle")
 _VALUES: Final = ("deviation_um", "position_mm")
-# Targets that differ by less are one target, mm.
+# Targets that differ by less are one target, mm, also where no step says more.
 _ROUNDING: Final = 1e-6
 
 
@@ -35,6 +36,7 @@ class PositionReadings(Displayed):
     deviations: Mapping[tuple[float, str, int], float]
     line: str = ""  # what was measured, in words
     lost: int = 0  # rows whose reading is missing
+    apart: float = 0.0  # mm, how far set-points of a file were from the target that they were taken for
 
     def __post_init__(self) -> None:
         if len(self.targets) < 2 or list(self.targets) != sorted(set(self.targets)):
@@ -88,35 +90,74 @@ def read_positions(path: str | PathLike[str]) -> PositionReadings:
         raise InvalidArgument(f"{path}: the file has no rows")
     columns = [name.strip() for name in header]
     value_column = _value_column(columns, f"{path}, line {at_line}")
-    targets: list[float] = []
-    deviations: dict[tuple[float, str, int], float] = {}
-    keys: set[tuple[float, str, int]] = set()
+    read: list[tuple[str, float, str, int, float | None]] = []  # where, set-point, direction, cycle, deviation
     for at_line, fields in rows:
         where = f"{path}, line {at_line}"
         if len(fields) != len(columns):
             raise InvalidArgument(f"{where}: expected {len(columns)} fields, got {len(fields)}")
         row = {name: field.strip() for name, field in zip(columns, fields, strict=True)}
         target = finite_number(row["target_mm"], f"{where}: target_mm")
-        target = next((known for known in targets if abs(known - target) < _ROUNDING), target)
         if row["direction"] not in ("+", "-"):
             raise InvalidArgument(f"{where}: direction: expected + or -, got {row['direction']!r}")
         if not re.fullmatch(r"\d{1,9}", row["cycle"]):
             raise InvalidArgument(f"{where}: cycle: expected a whole number, got {row['cycle']!r}")
-        key = target, row["direction"], int(row["cycle"])
-        if key in keys:
-            raise InvalidArgument(f"{where}: target {target:g} mm, direction {key[1]}, cycle {key[2]} is given twice")
-        keys.add(key)
-        if target not in targets:
-            targets.append(target)
+        deviation = None
         if row[value_column]:
             value = finite_number(row[value_column], f"{where}: {value_column}")
-            deviations[key] = value * MICROMETRE if value_column == "deviation_um" else value - target
+            deviation = value * MICROMETRE if value_column == "deviation_um" else value - target
+        read.append((where, target, row["direction"], int(row["cycle"]), deviation))
+    target_of = _targets([(target, direction, cycle) for _, target, direction, cycle, _ in read])
+    deviations: dict[tuple[float, str, int], float] = {}
+    keys: set[tuple[float, str, int]] = set()
+    for where, set_point, direction, cycle, deviation in read:
+        key = target_of[set_point], direction, cycle
+        if key in keys:
+            raise InvalidArgument(f"{where}: target {key[0]:g} mm, direction {direction}, cycle {cycle} is given twice")
+        keys.add(key)
+        if deviation is not None:
+            deviations[key] = deviation
+    apart = max((abs(set_point - target) for set_point, target in target_of.items()), default=0.0)
     try:
         return PositionReadings(
-            tuple(sorted(targets)), deviations, leading.get("line", ""), len(keys) - len(deviations)
+            tuple(sorted(set(target_of.values()))),
+            deviations,
+            leading.get("line", ""),
+            len(keys) - len(deviations),
+            apart if apart > _ROUNDING else 0.0,
         )
     except InvalidArgument as error:
         raise InvalidArgument(f"{path}: {error}") from None
+
+
+def _targets(rows: list[tuple[float, str, int]]) -> dict[float, float]:
+    """Of each set-point its target: controllers log what they read back, a little off.
+
+    A cycle comes to each target once in a direction, so its smallest step is one between targets; steps of less than a
+    hundredth of the usual one are targets given twice. What is closer than half of it is one target, the plainest
+    number among them."""
+    series: dict[tuple[str, int], list[float]] = {}
+    for target, direction, cycle in rows:
+        series.setdefault((direction, cycle), []).append(target)
+    steps = sorted(b - a for own in series.values() for a, b in pairwise(sorted(own)))
+    usual = steps[len(steps) // 2] if steps else 0.0
+    near = 0.5 * min((step for step in steps if step >= 0.01 * usual), default=0.0)
+    groups: list[list[float]] = []
+    for target in sorted({target for target, _, _ in rows}):
+        if groups and target - groups[-1][-1] < max(near, _ROUNDING):
+            groups[-1].append(target)
+        else:
+            groups.append([target])
+    return {target: _plainest(group) for group in groups for target in group}
+
+
+def _plainest(group: list[float]) -> float:
+    """Between the first and the last the number with the fewest decimals, else the median."""
+    median = group[len(group) // 2]
+    for decimals in range(7):
+        rounded = round(median, decimals)
+        if group[0] <= rounded <= group[-1]:
+            return rounded
+    return median
 
 
 def _rows(text: str, path: str) -> Iterator[tuple[int, list[str]]]:

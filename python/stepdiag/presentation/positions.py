@@ -37,6 +37,7 @@ def measured_blocks(result: MeasuredPositions) -> Iterator[Block]:
     yield NoteBlock(
         f"{len(readings.targets)} targets from {readings.targets[0]:g} to {readings.targets[-1]:g} mm, "
         f"{len(readings.cycles)} cycles, {arrows}, {len(readings.deviations)} readings, {readings.lost} lost"
+        + (f", set-points up to {readings.apart * 1e3:.2g} µm from their target" if readings.apart else "")
     )
     yield HeadingBlock("figures")
     rows = (

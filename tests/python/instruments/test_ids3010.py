@@ -275,3 +275,30 @@ def test_instrument_that_knows_neither_interface_is_told() -> None:
         return json.dumps({"error": {"code": -32601, "message": "no"}, "id": request["id"]}).encode() + b"\n"
 
     assert "knows neither com.attocube.ids nor com.attocube.sen" in error_of(answer)
+
+
+def test_reply_behind_a_flood_of_others_is_not_waited_for() -> None:
+    """5,000 replies with other ids before each: refused at the first request, not after minutes."""
+    other = json.dumps({"jsonrpc": "2.0", "result": [0, "nothing"], "id": -1}).encode() + b"\r\n"
+
+    def flooding(request: Request) -> bytes:
+        return other * 5000 + sound(request)
+
+    began = time.monotonic()
+    with (
+        instrument(flooding) as address,
+        client(address) as ids,
+        pytest.raises(InstrumentError, match="more than 100 replies with other ids"),
+    ):
+        ids.mode()
+    assert time.monotonic() - began < 10.0  # its time limit
+
+
+def test_mode_that_is_no_word_is_refused() -> None:
+    answer = only("getCurrentMode", lambda r: reply(r, 0, "\x1b[2Jmeasurement running"))
+    with (
+        instrument(answer) as address,
+        client(address) as ids,
+        pytest.raises(InstrumentError, match="expected a mode in words"),
+    ):
+        ids.mode()

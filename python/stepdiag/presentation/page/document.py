@@ -120,7 +120,7 @@ def write_report(request: ReportRequest, output: Path) -> Contents:
     if is_pdf:
         write_pdf(page, output)
     else:
-        write_whole(output, page)
+        write_whole(output, page.encode())  # its own texts are escaped; Plotly's is left as it is
     return contents
 
 

@@ -5,12 +5,17 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import Final
 
+from stepdiag.display import visible
 from stepdiag.presentation.blocks import Block, HeadingBlock, NoteBlock, RowBlock, TableBlock, VerdictBlock
 from stepdiag.presentation.page.language import is_foreign, said
 
 _MOST_REASONS: Final = 6
 _SAID: Final = ("aria-label", "alt", "title", "placeholder")  # attributes that are words
 _TEXTS: Final = ("p", "li", "dd", "dt", "td", "th", "strong", "figcaption", "caption", "h2", "h3", "summary")
+
+
+def _escaped(text: str) -> str:
+    return html.escape(visible(text, lines=True))
 
 
 class Markup(str):
@@ -21,7 +26,7 @@ class Markup(str):
 
 def as_given(text: str) -> Markup:
     """A text that is no word of ours, such as a name: escaped, and the same in every language."""
-    return Markup(html.escape(text))
+    return Markup(_escaped(text))
 
 
 def markup(*content: object) -> Markup:
@@ -36,7 +41,7 @@ def _joined(content: Iterable[object], *, foreign: bool = False) -> Markup:
         if isinstance(part, Markup):
             parts.append(part)
         elif part is not None:
-            text = html.escape(said(str(part)))
+            text = _escaped(said(str(part)))
             parts.append(f'<span lang="en">{text}</span>' if foreign and is_foreign(str(part)) else text)
     return Markup("".join(parts))
 
@@ -50,14 +55,12 @@ def element(name: str, /, *content: object, **attributes: object) -> Markup:
             continue
         key = key.removesuffix("_").replace("_", "-")
         words = said(str(value)) if key in _SAID else str(value)
-        given.append(f" {key}" if value is True else f' {key}="{html.escape(words)}"')
+        given.append(f" {key}" if value is True else f' {key}="{_escaped(words)}"')
     opening = f"<{name}{''.join(given)}>"
     if name in ("meta", "img", "input", "link", "br", "hr"):
         return Markup(opening)
     if name in ("code", "pre"):
-        return Markup(
-            f"{opening}{''.join(p if isinstance(p, Markup) else html.escape(str(p)) for p in content)}</{name}>"
-        )
+        return Markup(f"{opening}{''.join(p if isinstance(p, Markup) else _escaped(str(p)) for p in content)}</{name}>")
     return Markup(f"{opening}{_joined(content, foreign=name in _TEXTS)}</{name}>")
 
 
