@@ -49,7 +49,7 @@ KINDS = {
     "position-error": POSITION_ERROR,
 }
 FORMATS = ("linuxcnc-comp", *KINDS)
-FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # linuxcnc-comp
+FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(9)}  # linuxcnc-comp
 
 
 def _ending(params: Mapping[str, Any]) -> str:

@@ -124,6 +124,8 @@ def _type(about: Any, kind: Any) -> Any:
         return click.Choice(list(about["words"]))
     if get_origin(kind) is Literal:
         return click.Choice(list(get_args(kind)))
+    if kind is Path:
+        return PATH
     if kind is int:
         return int if least is None else click.IntRange(least)
     if kind is float and (least, above) == (None, None):

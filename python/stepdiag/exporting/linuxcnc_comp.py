@@ -8,11 +8,13 @@ is the positioning error along the line on which the other two axes are at `at`,
 
     E(p) = e_a(p on the line) - e_a(home on the line),
 
-which is EXX plus theta x L of that line (Abbe). The trims are those of the inverse, c + E(c) =
+which is EXX plus theta x L of that line (Abbe). Joints of one axis, as the two motors of a
+gantry, have the same table. The trims are those of the inverse, c + E(c) =
 nominal, and therefore exact at every row. `actual` differs from nominal + E by E times its slope,
 which is nanometres.
 """
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -38,6 +40,7 @@ from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of
 from stepdiag.findings.meaning import provenance_rows, trust_rows
 from stepdiag.io.comp_set import fingerprint_rows
+from stepdiag.io.whole_files import read_text
 from stepdiag.parameters import AXES
 
 # EMCMOT_COMP_SIZE; LinuxCNC 2.9 reports an error for more rows, and starts without the rest.
@@ -58,19 +61,23 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
     tool = tool_of(calibration, options)
     missing = require(calibration, _needed(), options)
     machine = Machine(calibration.chain, calibration.to_error_map(), tool)
-    joints = [JointTable(machine, calibration.volume, axis, at, rows) for axis in AXES]
+    letters = joints_of(options)
+    tables = [JointTable(machine, calibration.volume, axis, at, rows) for axis in AXES]
+    joints = [(n, tables[AXES.index(letter)]) for n, letter in enumerate(letters) if letter in AXES]
 
     head = list(_what_the_files_are(calibration, at, tool, origin_of(options), missing))
-    losses = [joint.sentence() for joint in joints]
+    losses = [joint.sentence(n) for n, joint in joints]
 
     def motors(commanded: FloatArray, direction: int) -> FloatArray:
-        trims = [joint.trim(commanded[:, n], direction) for n, joint in enumerate(joints)]
+        trims = [table.trim(commanded[:, n], direction) for n, table in enumerate(tables)]
         return commanded + np.column_stack(trims)
 
     left = left_in_volume(calibration, tool, motors)
     said = [*what_is_left(calibration, left), LEFT_OUT]
-    files = {output / f"joint{n}.comp": joint.text(float(origin_of(options)[n])) for n, joint in enumerate(joints)}
-    files[output / COMPANION] = _companion([*head, *losses, *said], {path.name: text for path, text in files.items()})
+    origin = origin_of(options)
+    files = {output / f"joint{n}.comp": joint.text(float(origin[joint.index])) for n, joint in joints}
+    texts = {path.name: text for path, text in files.items()}
+    files[output / COMPANION] = _companion([*head, *losses, *said], texts, letters)
     positioning = [f"E{axis}{axis}" for axis in AXES]
     coverage = coverage_of(calibration, positioning, [name for name in _needed() if name not in positioning])
     paste = f"note: paste the lines of {output / COMPANION} into the INI file"
@@ -80,6 +87,39 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
 def _needed() -> list[str]:
     """The parameters that determine a positioning error away from home."""
     return [f"E{component}{axis}" for axis in AXES for component in (axis, *"ABC")]
+
+
+def joints_of(options: ExportOptions) -> str:
+    """The axis of each joint. Raises InvalidArgument, also where the INI file has others."""
+    given = None if options.coordinates is None else options.coordinates.upper()
+    if given is not None and (not re.fullmatch(r"[XYZABCUVW]{3,9}", given) or not set(AXES) <= set(given)):
+        raise InvalidArgument(
+            f"`coordinates`: expected a letter for each joint, X, Y and Z among them, such as XYYZ, got {given!r}"
+        )
+    if options.ini is None:
+        return given or "".join(AXES)
+    found = _coordinates_of(options.ini)
+    if given is not None and given != found:
+        raise InvalidArgument(f"`coordinates`: expected {found}, as {options.ini} has them, got {given}")
+    return found
+
+
+def _coordinates_of(path: Path) -> str:
+    """Of an INI file of LinuxCNC: [KINS] KINEMATICS = trivkins coordinates=XYYZ; without them XYZ."""
+    text = read_text(path)
+    kins = re.search(r"(?ims)^\s*\[KINS\](.*?)(?=^\s*\[|\Z)", text)
+    kinematics = re.search(r"(?im)^\s*KINEMATICS\s*=\s*(\w+)(.*)$", kins[1]) if kins else None
+    if kinematics is None:
+        raise InvalidArgument(f"{path}: expected an INI file of LinuxCNC with KINEMATICS in [KINS]")
+    given = re.search(r"(?i)coordinates\s*=\s*([A-Z]+)", kinematics[2])
+    letters = given[1].upper() if given else "".join(AXES)
+    joints = re.search(r"(?im)^\s*JOINTS\s*=\s*(\d+)", kins[1] if kins else "")
+    if not set(AXES) <= set(letters) or (joints is not None and int(joints[1]) != len(letters)):
+        raise InvalidArgument(
+            f"{path}: [KINS]: expected X, Y and Z among the coordinates, one for each of JOINTS, got {letters}"
+            + (f" for {joints[1]} joints" if joints else "")
+        )
+    return letters
 
 
 class JointTable:
@@ -130,11 +170,11 @@ class JointTable:
             rows.append(f"{nominal:.9f} {nominal - there:.9f} {nominal - back:.9f}\n")
         return "".join(rows)
 
-    def sentence(self) -> str:
+    def sentence(self, joint: int) -> str:
         reversal = float(np.max(np.abs(self.error[0] - self.error[1])))
         two = f"reversal up to {reversal * 1e3:.3g} µm" if reversal else "no reversal: both directions alike"
         return (
-            f"joint {self.index} ({self.axis}): {len(self.kept)} rows of {len(self.nodes)} nodes, error up to "
+            f"joint {joint} ({self.axis}): {len(self.kept)} rows of {len(self.nodes)} nodes, error up to "
             f"{np.max(np.abs(self.error)) * 1e3:.4g} µm, {two}; the table deviates from the exact inverse by at most "
             f"{self.loss * 1e3:.2g} µm"
         )
@@ -156,11 +196,14 @@ def _what_the_files_are(
     ]
 
 
-def _companion(sentences: list[str], tables: Mapping[str, str]) -> str:
+def _companion(sentences: list[str], tables: Mapping[str, str], letters: str) -> str:
     ini = [f"# {sentence}" for sentence in ["stepdiag export --to linuxcnc-comp", *sentences]]
     ini.append("# LinuxCNC ignores BACKLASH of a joint with a COMP_FILE: what is known of reversal is in the files")
-    ini.append("# for LINEAR_UNITS = mm, and joints 0 1 2 = X Y Z; paths are relative to the INI file")
+    numbers = " ".join(str(n) for n in range(len(letters)))
+    ini.append(
+        f"# for LINEAR_UNITS = mm, and joints {numbers} = {' '.join(letters)}; paths are relative to the INI file"
+    )
     ini += fingerprint_rows(tables)
-    for n in range(3):
+    for n in (n for n, letter in enumerate(letters) if letter in AXES):
         ini += ["", f"[JOINT_{n}]", f"COMP_FILE = joint{n}.comp", "COMP_FILE_TYPE = 0"]
     return in_ascii("\n".join(ini)) + "\n"

@@ -1,6 +1,7 @@
 """Options of an export."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from stepdiag.option_field import option
@@ -34,6 +35,12 @@ class ExportOptions:
         "Largest number of rows in a table (linuxcnc-comp, isg, position-error).  [default: 256, 5000, every node]",
         metavar="N",
     )
+    coordinates: str | None = option(
+        None,
+        "Axis of each joint, as [KINS] KINEMATICS has them; XYYZ is a gantry (linuxcnc-comp).  [default: XYZ]",
+        metavar="LETTERS",
+    )
+    ini: Path | None = option(None, "INI file with which `coordinates` are compared (linuxcnc-comp).", metavar="FILE")
     axis: AxisName | None = option(None, "The axis that is in error (position-error).")
     depends_on: AxisName | None = option(None, "The axis on whose position it depends, or itself.")
     nodes: tuple[int, int, int] | None = option(

@@ -33,7 +33,7 @@ from stepdiag.wrong_arguments import checked
 
 # Format -> its options besides `tool`, `origin`, `incomplete` and `accept_rejected`.
 FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
-    "linuxcnc-comp": ("at", "rows"),
+    "linuxcnc-comp": ("coordinates", "ini", "at", "rows"),
     "linuxcnc-kins": ("approach",),
     "isg": ("approach", "rows", "squareness"),
     "csv-grid": ("approach", "nodes", "step", "orientation"),

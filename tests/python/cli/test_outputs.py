@@ -95,7 +95,13 @@ INPUTS = {
     *{("recheck", name) for name in ("baseline", "scenario", "run")},
     ("plan", "baseline"),
     ("plan", "measured"),
-    *{("export", "calibration"), ("export", "replaces"), ("volume", "calibration"), ("book add", "files")},
+    *{
+        ("export", "calibration"),
+        ("export", "replaces"),
+        ("export", "ini"),
+        ("volume", "calibration"),
+        ("book add", "files"),
+    },
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
     *{("plot", "files"), ("plot", "truth"), ("plot", "scenario"), ("acquire", "temperatures")},
 }

@@ -243,3 +243,53 @@ def test_all_files_are_on_the_disk_before_the_first_takes_its_name(
         with pytest.raises(sd.InvalidArgument, match="No space left on device"):
             export(random_calibration(2), "linuxcnc-comp", tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+GANTRY = """[EMC]
+MACHINE = gantry
+[KINS]
+KINEMATICS = trivkins coordinates=XYYZ kinstype=BOTH
+JOINTS = 4
+[TRAJ]
+COORDINATES = XYYZ
+"""
+
+
+def test_both_motors_of_a_gantry_have_the_table_of_their_axis(tmp_path: Path) -> None:
+    calibration = random_calibration(seed=5)
+    export(calibration, "linuxcnc-comp", tmp_path / "plain")
+    export(calibration, "linuxcnc-comp", tmp_path / "gantry", coordinates="xyyz")
+    plain, gantry = (
+        [path.read_text() for path in sorted((tmp_path / name).glob("*.comp"))] for name in ("plain", "gantry")
+    )
+    assert gantry == [plain[0], plain[1], plain[1], plain[2]]
+    ini = (tmp_path / "gantry" / "compensation.ini").read_text()
+    assert "joints 0 1 2 3 = X Y Y Z" in ini
+    assert re.findall(r"\[JOINT_(\d)\]\nCOMP_FILE = joint(\d)\.comp", ini) == [(str(n), str(n)) for n in range(4)]
+    assert main(["check", str(tmp_path / "gantry" / "compensation.ini")]) == 0
+
+
+def test_coordinates_are_those_of_the_ini_file(tmp_path: Path) -> None:
+    ini = tmp_path / "gantry.ini"
+    ini.write_text(GANTRY)
+    calibration = random_calibration(seed=5)
+    export(calibration, "linuxcnc-comp", tmp_path / "found", ini=ini)
+    assert (tmp_path / "found" / "joint3.comp").exists()
+    refused(
+        export,
+        calibration,
+        "linuxcnc-comp",
+        tmp_path / "other",
+        ini=ini,
+        coordinates="XYZ",
+        names="`coordinates`: expected XYYZ, as",
+    )
+    ini.write_text(GANTRY.replace("JOINTS = 4", "JOINTS = 3"))
+    refused(export, calibration, "linuxcnc-comp", tmp_path / "other", ini=ini, names="got XYYZ for 3 joints")
+    ini.write_text("[TRAJ]\n")
+    refused(export, calibration, "linuxcnc-comp", tmp_path / "other", ini=ini, names="KINEMATICS in [KINS]")
+    for wrong in ("XY", "XXYY", "XYZ1"):
+        refused(
+            export, calibration, "linuxcnc-comp", tmp_path / "other", coordinates=wrong, names="expected a letter for"
+        )
+    assert not (tmp_path / "other").exists()
