@@ -21,16 +21,31 @@ SAME_NODE: Final = 1e-6  # mm: closer nodes count as one; tables have nine digit
 def require(calibration: Calibration, names: Sequence[str], options: ExportOptions) -> list[str]:
     """Notes on which of `names` are undetermined, or not determined over the whole volume.
 
-    Raises InvalidArgument if one is undetermined, unless `options.incomplete`."""
+    What an axis brings that was not measured at all, as the third one of a machine of two, is exported as 0. Raises
+    InvalidArgument if another one is undetermined, unless `options.incomplete`."""
     missing = list(undetermined_of(calibration, names))
+    unmeasured = [axis for axis in AXES if _is_unmeasured(calibration, axis)]
+    said = []
+    if len(unmeasured) == 1:
+        (axis,) = unmeasured
+        missing = [name for name in missing if axis not in (name[2], _OTHER_AXIS.get(name))]
+        said.append(f"note: {axis} was not measured: it is taken to be without errors and is not compensated")
     if missing and not options.incomplete:
         raise InvalidArgument(
             f"not determined by this calibration: {', '.join(missing)}; with `incomplete` it is exported as 0"
         )
-    said = [f"NOT COMPENSATED, because not determined: {', '.join(missing)}"] if missing else []
+    said += [f"NOT COMPENSATED, because not determined: {', '.join(missing)}"] if missing else []
     if held := list(_held(calibration, names)):
         said.append(f"note: outside their nodes tables hold their end values: {', '.join(held)}")
     return said
+
+
+_OTHER_AXIS: Final = {"C0Y": "X", "B0Z": "X", "A0Z": "Y"}  # of a squareness, beside that of its name
+
+
+def _is_unmeasured(calibration: Calibration, axis: str) -> bool:
+    functions = any(f"E{component}{axis}" in calibration.functions for component in "XYZABC")
+    return not functions and not any(axis in (name[2], _OTHER_AXIS[name]) for name in calibration.squareness)
 
 
 def _held(calibration: Calibration, names: Sequence[str]) -> Iterator[str]:

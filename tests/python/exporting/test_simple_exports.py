@@ -18,6 +18,7 @@ from simple_exports import MOTORS, rows_of, settings
 from usual import ALL_CHAINS, CHAIN
 
 import stepdiag as sd
+from stepdiag.calibration.parts import parts_of
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export
 from stepdiag.exporting.write import write_export
@@ -342,3 +343,23 @@ def test_calibxyzkins_is_told_to_solve_to_better_than_its_micrometre(tmp_path: P
     """Its default tolerance leaves errors below 1 µm as they are: nothing would be compensated near home."""
     export(random_calibration(2, CHAIN), "calibxyzkins", tmp_path / "c.hal")
     assert settings(tmp_path / "c.hal")["calibxyzkins.tol"] == 1e-9
+
+
+@pytest.mark.parametrize("to", ["squareness", "linuxcnc-comp"])
+def test_machine_of_two_axes_needs_no_permission(tmp_path: Path, to: str) -> None:
+    """X and Y were measured, Z was not: it is taken to be without errors, and that is said."""
+    functions = {
+        f"E{component}{axis}": (np.array([0.0, 80.0]), np.array([0.0, 0.004]), np.full(2, np.nan))
+        for axis in "XY"
+        for component in "XYABC"
+    }
+    whole = random_calibration(seed=5)
+    parts = parts_of(whole) | {"functions": functions, "squareness": {"C0Y": (1e-4, np.nan)}}
+    calibration = sd.Calibration(**parts)
+    out = tmp_path / ("comp" if to == "linuxcnc-comp" else "table.csv")
+    notes = sd.export(calibration, out, to=to)
+    assert "note: Z was not measured: it is taken to be without errors and is not compensated" in notes
+    without = sd.Calibration(**(parts | {"functions": functions | {"EXZ": functions["EXX"]}}))
+    if to == "linuxcnc-comp":  # a part of Z is known: that is a gap
+        with pytest.raises(sd.InvalidArgument, match="not determined by this calibration"):
+            sd.export(without, tmp_path / "other", to=to)
