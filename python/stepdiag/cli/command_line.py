@@ -56,6 +56,22 @@ COMMANDS: Final = {
     "head": ("head", "Draw and check descriptions of laser heads."),
 }
 
+# Words of other programs -> command.
+_MEANT: Final = {
+    "adjust": "evaluate",
+    "analyse": "evaluate",
+    "analyze": "evaluate",
+    "calibrate": "evaluate",
+    "compensate": "export",
+    "fit": "evaluate",
+    "gcode": "nc",
+    "gui": "app",
+    "measure": "acquire",
+    "new": "init",
+    "validate": "verify",
+    "web": "app",
+}
+
 
 class Commands(click.Group):
     """Imports a command when it is used: their list, and the other commands, do not wait for it."""
@@ -71,6 +87,21 @@ class Commands(click.Group):
         command: click.Command = commands.get(name) or commands[f"{name}_"]  # import is a word of Python
         command.short_help = short_help
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """An unknown command is named with the one that is meant."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError:
+            from difflib import get_close_matches
+
+            word = args[0].lower()
+            near = [_MEANT[word]] if word in _MEANT else get_close_matches(word, COMMANDS, n=1)
+            if not near or word.startswith("-"):
+                raise
+            raise click.UsageError(f"No such command {args[0]!r}: did you mean {near[0]}?", ctx) from None
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -157,7 +157,7 @@ def test_calibration_has_the_same_bytes_when_the_truth_is_deleted(case: str, met
 MISTAKES: list[tuple[list[str], str]] = [
     (["simulate"], "Missing argument 'SCENARIO'"),
     (["simulate", "scenario.toml"], "Missing option '-o'"),
-    (["simulat", "scenario.toml"], "No such command 'simulat'"),
+    (["simulat", "scenario.toml"], "No such command 'simulat': did you mean simulate?"),
     (["simulate", "scenario.toml", "-o", "out.csv", "--fast"], "No such option"),
     (["simulate", "no.toml", "-o", "out.csv"], "no.toml: cannot be read: No such file or directory"),
     (
@@ -278,3 +278,14 @@ def test_failed_evaluation_leaves_an_older_result_alone(here: Path) -> None:
     Path("other.toml").write_text(SCENARIO.replace("steps = 5", "steps = 4"))
     assert run("evaluate", "other.toml", "run.csv", "-o", "calibration.csv") == 2
     assert Path("calibration.csv").read_text() == "older"
+
+
+@pytest.mark.parametrize(("word", "meant"), [("evalute", "evaluate"), ("calibrate", "evaluate"), ("Report", "report")])
+def test_command_that_is_meant_is_named(word: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([word]) == 2
+    assert f"No such command '{word}': did you mean {meant}?" in capsys.readouterr().err
+
+
+def test_command_like_no_other_is_not_guessed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["qqqq"]) == 2
+    assert "did you mean" not in capsys.readouterr().err
