@@ -5,9 +5,10 @@ control.py. A person is asked at both; the first answer counts.
 """
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Protocol, Self, runtime_checkable
@@ -67,6 +68,7 @@ class Conductor:
         self._is_followed = raw is not None or self._asking is not None
         self._live: LiveFile | None = None
         self._control: ControlFile | None = None
+        self._waiting: deque[tuple[Control, str]] = deque()  # what people want
         self.remark: Callable[[str], None] = lambda _: None
         self.cross: Callable[[Sample], tuple[float, float] | None] = lambda _: None
         self.source = instrument.read  # of samples
@@ -146,10 +148,11 @@ class Conductor:
     def _wanted(self) -> Iterator[Control]:
         """What people want now; remarks and the end are seen to here."""
         now = time.monotonic()
-        if self._control is None or now - self._looked < BETWEEN_LOOKS:
-            return
-        self._looked = now
-        for control, text in self._control.new():
+        if self._control is not None and now - self._looked >= BETWEEN_LOOKS:
+            self._looked = now
+            self._waiting.extend(self._control.new())
+        while self._waiting:  # what comes after an answer waits for who looks next
+            control, text = self._waiting.popleft()
             if control == "stop":
                 raise KeyboardInterrupt
             if control == "remark":
@@ -187,7 +190,7 @@ class Conductor:
             while True:
                 self._show()
                 mine = asking.answered()
-                for control in [*([mine] if mine else []), *self._wanted()]:
+                for control in chain([mine] if mine else [], self._wanted()):
                     if control in answers:
                         if control != mine:
                             asking.withdraw()

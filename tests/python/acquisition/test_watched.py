@@ -263,3 +263,16 @@ def test_state_does_not_grow() -> None:
     assert len(state.messages) == MESSAGES
     assert len(json.dumps(state.messages)) < 5000
     assert state.messages[-1][0] == 100
+
+
+def test_what_comes_with_an_answer_is_done_too(tmp_path: Path) -> None:
+    """Yes and stop in one look: the point is read, then it stops."""
+    described = scenario(plan='lines = ["ppp"]\nsteps = 1')
+    with Twin(described) as twin, watched(described, twin, tmp_path / "run.csv", KeyTrigger()) as page:
+        twin.instrument.move_to(described.known.plan.points("ppp")[0])
+        page.until(asked=1, values=len)
+        with page.control.open("ab") as file:
+            file.write(b'{"control": "confirm"}\n{"control": "remark", "text": "late"}\n{"control": "stop"}\n')
+        page.until(doing="ended", readings=1, failure="stopped")
+    assert isinstance(page.error, KeyboardInterrupt)
+    assert any(isinstance(one, Remark) for one in read_raw(tmp_path / "run.raw.jsonl").records)
