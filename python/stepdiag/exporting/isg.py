@@ -15,6 +15,7 @@ is therefore written such that it depends little on their interpretation:
 - squarenesses are written as slopes of straightness, unless requested as parameters.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -147,20 +148,29 @@ def _largest_loss(exact: Machine, written: Machine, tables: dict[str, Table], or
         nodes = np.union1d(x, inside(common_nodes(exact.errors, axis), float(x[-1] - x[0])) + origin[n])
         samples.append(np.union1d(nodes, 0.5 * (nodes[1:] + nodes[:-1])))
 
-    def loss(points: list[FloatArray]) -> tuple[float, FloatArray]:
-        grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
-        there = exact.error(grid - origin)
+    def distance(places: FloatArray) -> FloatArray:
+        there = exact.error(places - origin)
         # The manuals do not say whether a controller includes products of two errors.
-        models = (written.error(grid), written.first_order_error(grid))
-        distance = np.max([np.linalg.norm(model - there, axis=1) for model in models], axis=0)
-        worst = int(np.argmax(distance))
-        return float(distance[worst]), grid[worst]
+        models = (written.error(places), written.first_order_error(places))
+        return np.asarray(np.max([np.linalg.norm(model - there, axis=1) for model in models], axis=0))
 
-    best, place = loss([spread(s, 41) for s in samples])
-    for n in range(3):
-        found, where = loss([samples[k] if k == n else place[k : k + 1] for k in range(3)])
-        if found > best:
-            best, place = found, where
+    grid = np.stack(np.meshgrid(*(spread(s, 41) for s in samples), indexing="ij"), axis=-1)
+    found = distance(grid.reshape(-1, 3)).reshape(grid.shape[0], -1)
+    # From the worst point of each slice along one axis after the other, as long as it gets worse.
+    starts = grid.reshape(len(grid), -1, 3)[np.arange(len(grid)), np.argmax(found, axis=1)]
+    return max(_climbed(place, samples, distance) for place in starts)
+
+
+def _climbed(place: FloatArray, samples: list[FloatArray], distance: Callable[[FloatArray], FloatArray]) -> float:
+    best, before = float(distance(place[None, :])[0]), -1.0
+    while best > before:
+        before = best
+        for n, along in enumerate(samples):
+            line = np.tile(place, (len(along), 1))
+            line[:, n] = along
+            found = distance(line)
+            if found.max() > best:
+                best, place = float(found.max()), line[int(np.argmax(found))]
     return best
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exported import CHAINS, TOOL, VOLUME, IsgFile, calibration_of, export, machine_of, points_in, random_calibration
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from refusal import refused
 
@@ -69,6 +69,7 @@ def test_straightness_of_an_axis_that_carries_the_workpiece_is_that_of_the_funct
 
 @settings(max_examples=8)
 @given(seed=st.integers(0, 1000), rows=st.integers(20, 60))
+@example(seed=0, rows=54)  # the worst point is not on a line through the worst one of a coarse grid
 def test_resampling_keeps_the_rows_and_the_loss_that_is_said(
     tmp_path_factory: pytest.TempPathFactory, seed: int, rows: int
 ) -> None:
@@ -82,7 +83,7 @@ def test_resampling_keeps_the_rows_and_the_loss_that_is_said(
     deviation = np.linalg.norm(file.error(positions, "XYZ") - exact, axis=1)
     said = re.search(r"by at most ([0-9.e-]+) µm in the volume", report)
     assert said
-    # Looked for on a part of all combinations of nodes, from the worst of which one goes along each axis.
+    # Looked for on a part of all combinations of nodes, and from the worst of each slice along the axes.
     assert np.max(deviation) * 1e3 < float(said[1]) * 1.1
 
 
