@@ -126,6 +126,11 @@ def _words_of(error: OSError) -> str:
     """Where it has no file, it was standard output: files are written by functions that name them."""
     if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG):
         why = os.strerror(error.errno)
+        null = os.open(
+            os.devnull, os.O_WRONLY
+        )  # what is still in the buffer goes nowhere, instead of failing once more
+        os.dup2(null, 1)
+        os.close(null)
         return f"standard output: {why}: what the command says was not written, what it wrote to files was"
     return str(error)
 

@@ -69,10 +69,11 @@ def test_what_is_seen_stays() -> None:
 def test_full_standard_output_is_named(calibrated: Path) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full")
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:
         command = [sys.executable, "-m", "stepdiag", "report", "c.csv", "-o", "page.html", "--json"]
-        found = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
-        plain = subprocess.run(command[:5], stdout=full, stderr=subprocess.PIPE, text=True)
+        found = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
+        plain = subprocess.run(command[:5], stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
     assert plain.returncode == 2
     assert plain.stderr.startswith(
         f"stepdiag: error: standard output: {os.strerror(errno.ENOSPC)}: what the command says"
