@@ -101,7 +101,8 @@ def unsound_files(place: Path, killed: bool = False) -> str:
     from stepdiag.acquisition.raw_file import read_raw
     from stepdiag.io.data_files import read_measurement
 
-    names = {path.name for path in place.iterdir()} - {"scenario.toml", "out.csv", "out.raw.jsonl"}
+    own = {"scenario.toml", "out.csv", "out.raw.jsonl", ".out.live.json", ".out.control.jsonl"}
+    names = {path.name for path in place.iterdir()} - own
     if names and not killed:
         return f"left {sorted(names)}"
     raw, out = place / "out.raw.jsonl", place / "out.csv"
