@@ -128,10 +128,10 @@ class Acquisition:
         """Returns the visit that is begun now; `begun`: that before."""
         nominal = self._header.plan[visit.number - 1].nominal_mm
         self._operator.at(visit, index, nominal[index])
-        head, frame = self._known.heads[visit.line], np.asarray(self._known.plan.frame(visit.line))
-        columns, sign = self._instrument.columns, self._header.sign
-        self._operator.cross = lambda sample: cross_of(head, frame, columns, sample.values, sign)
         if visit.number != begun:
+            head, frame = self._known.heads[visit.line], np.asarray(self._known.plan.frame(visit.line))
+            columns, sign = self._instrument.columns, self._header.sign
+            self._operator.cross = lambda sample: cross_of(head, frame, columns, sample.values, sign)
             self._instrument.use_line(visit.line)
             self._trigger.begin(visit, index, self._instruction(visit, begun))
         key = (visit.number, int(visit.points[index]))

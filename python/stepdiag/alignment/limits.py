@@ -28,15 +28,20 @@ def limits_of(known: Known, visit: Visit) -> AlignmentLimits:
     return AlignmentLimits(laser, reflector)
 
 
+def choice_of(known: Known, visit: Visit, quantity: str) -> str | float | None:
+    """What `[adjustment]`, or the table of this line, says of a quantity; None: nothing."""
+    keys, key = known.keys.adjustment, SETUP_QUANTITIES[quantity].key
+    own = keys.by_line.get(visit.line)
+    choice: str | float | None = None if own is None else getattr(own, key)
+    return getattr(keys, key) if choice is None else choice
+
+
 def _limit(known: Known, visit: Visit, quantity: str) -> float:
     keys = known.keys.adjustment
     if visit.is_scale_line:
         angle = scale_line_angle(keys, visit.line, quantity)
         return max(FIXED if angle == 0.0 else min(angle, FREE), LEAST)
-    key = SETUP_QUANTITIES[quantity].key
-    own = keys.by_line.get(visit.line)
-    choice = getattr(own, key, None) if own is not None else None
-    choice = getattr(keys, key) if choice is None else choice
+    choice = choice_of(known, visit, quantity)
     if choice is None or choice == "free":
         return FREE
     return FIXED if choice == "fixed" else max(min(float(choice) * MICRORADIAN, FREE), LEAST)

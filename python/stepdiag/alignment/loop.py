@@ -75,8 +75,9 @@ class AlignmentLoop:
             if state.is_aligned:
                 conductor.tell(f"line {visit.line} is aligned")
                 return fit
-            if not any(turn.is_seen for turn in fit.turns):
-                conductor.tell("warning: these readings do not show how laser and mirror stand")
+            if fit.is_all_that_is_seen and fit.fits_mirror:
+                unseen = " and ".join(turn.what for turn in fit.turns if not turn.is_seen)
+                conductor.tell(f"warning: line {visit.line}: these readings do not show the {unseen}: use the signal")
                 return fit
             if not conductor.repeats(f"line {visit.line} is not aligned: turn as said, then measure again"):
                 conductor.tell(f"warning: line {visit.line} stays as it is")

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag.acquisition.placement import sides
-from stepdiag.alignment.limits import limits_of
+from stepdiag.alignment.limits import choice_of, limits_of
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit
@@ -66,7 +66,8 @@ class Turn:
         if not self.is_seen:
             return f"{self.what}: these readings do not show it"
         if self.is_ready:
-            return f"{self.what}: {self.size / MILLI:.2f} mrad, within {self.limit / MILLI:.2g} mrad"
+            within = f"{self.size / MILLI:.2f} ± {2.0 * self.u / MILLI:.2f} mrad"
+            return f"{self.what}: {within}, within {self.limit / MILLI:.2g} mrad"
         ways = []
         for off, (one, other) in zip((self.right, self.up), self.names, strict=True):
             if abs(off) > 0.1 * self.limit:
@@ -86,7 +87,13 @@ class AlignmentFit:
 
     @property
     def is_ready(self) -> bool:
-        return all(turn.is_ready or not turn.is_seen for turn in self.turns) and any(t.is_seen for t in self.turns)
+        """Of both: what the readings do not show is not ready."""
+        return all(turn.is_ready for turn in self.turns)
+
+    @property
+    def is_all_that_is_seen(self) -> bool:
+        """Whether nothing that the readings show is left to be turned."""
+        return all(turn.is_ready or not turn.is_seen for turn in self.turns)
 
     @property
     def fits_mirror(self) -> bool:
@@ -171,15 +178,12 @@ class _Model:
 
 def _known_to(known: Known, visit: Visit, quantity: str) -> float:
     """Standard uncertainty with which the evaluation takes a constant of beams or of the spot for 0, mm."""
-    key = SETUP_QUANTITIES[quantity].key
-    own = known.keys.adjustment.by_line.get(visit.line)
-    choice = getattr(own, key, None) if own is not None else None
-    choice = getattr(known.keys.adjustment, key) if choice is None else choice
+    choice = choice_of(known, visit, quantity)
     if choice == "free":
         return FREE_LENGTH
     if choice is None or choice == "fixed":
         return FIXED_BEAM if quantity == "beam_constants" else FIXED_SPOT
-    return float(native(key, choice))
+    return float(native(SETUP_QUANTITIES[quantity].key, choice))
 
 
 def _fit(known: Known, visit: Visit, model: _Model, unknown: FloatArray, covariance: FloatArray) -> AlignmentFit:

@@ -150,6 +150,11 @@ def test_distances_alone_show_the_mirror_but_not_the_laser() -> None:
     assert found.turns[0].words == "laser: these readings do not show it"
     assert np.allclose(found.reflector, mirror, rtol=0.0, atol=0.1e-3)
     assert not found.is_ready
+    straight = [read(known, visit, one, np.zeros(2), np.zeros(2), 0.3)[:1] for one in places]
+    found = what_to_turn(known, visit, places, straight)
+    assert found.turns[1].is_ready
+    assert found.is_all_that_is_seen
+    assert not found.is_ready  # nobody knows where the laser points
 
 
 def test_the_beam_on_the_mirror() -> None:

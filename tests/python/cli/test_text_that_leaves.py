@@ -45,18 +45,17 @@ def test_texts_of_the_command_line_do_not_act_on_a_page(calibrated: Path) -> Non
     assert not UNSEEN.search(own)
 
 
-@pytest.mark.parametrize("to", ["grid", "squareness", "isg", "linuxcnc-comp", "matrix", "positions"])
+@pytest.mark.parametrize("to", ["csv-grid", "squareness", "isg", "linuxcnc-comp", "matrix", "linuxcnc-kins"])
 def test_texts_of_a_calibration_do_not_act_in_a_table(calibrated: Path, to: str) -> None:
     hostile = hostile_copy()
-    out = Path("table")
-    names = {"grid": "table.csv", "isg": "table.csv", "squareness": "table.csv", "matrix": "table.hal"}
-    out = Path(names.get(to, "table.csv"))
-    status = main(["export", str(hostile), "--to", to, "-o", str(out), "--incomplete"])
-    written = [path for path in calibrated.rglob("*") if path.is_file() and path.name.startswith("table")]
-    written += [path for folder in calibrated.glob("table*") if folder.is_dir() for path in folder.rglob("*")]
-    assert status in (0, 2, 3)
+    out = Path("table.hal" if to == "matrix" else "table" if to == "linuxcnc-comp" else "table.csv")
+    assert main(["export", str(hostile), "--to", to, "-o", str(out), "--incomplete"]) in (0, 3)
+    written = [
+        path for path in calibrated.rglob("*") if path.is_file() and "table" in str(path.relative_to(calibrated))
+    ]
+    assert written
     for path in written:
-        assert not UNSEEN.search(path.read_text(errors="replace")), path
+        assert not UNSEEN.search(path.read_text()), path
 
 
 def test_what_is_seen_stays() -> None:
@@ -71,14 +70,12 @@ def test_full_standard_output_is_named(calibrated: Path) -> None:
         pytest.skip("no /dev/full")
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "stepdiag", "report", "c.csv", "-o", "page.html", "--json"]
-        found = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
-        plain = subprocess.run(command[:5], stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
+        command = [sys.executable, "-m", "stepdiag", "report", "c.csv"]
+        plain = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
     assert plain.returncode == 2
     assert plain.stderr.startswith(
         f"stepdiag: error: standard output: {os.strerror(errno.ENOSPC)}: what the command says"
     )
-    assert found.returncode in (0, 2)
 
 
 def test_set_points_that_are_read_back_are_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -45,7 +45,8 @@ SECONDS = click.FloatRange(min=0.0, min_open=True)
 @click.option(
     "--source",
     metavar="URL",
-    help="The instrument: ids3010://HOST[:PORT], lines://127.0.0.1:PORT, or 'program:COMMAND ARGS' (JSON lines).",
+    help="The instrument: ids3010://HOST[:PORT], or JSON lines by lines://127.0.0.1:PORT, serial:PORT or "
+    "'program:COMMAND ARGS'; 'ids3010://... + ...' for a distance of the first and a spot of the second.",
 )
 @click.option(
     "--trigger",
