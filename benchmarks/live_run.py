@@ -38,7 +38,7 @@ z_mm = 500.0
 [machine]
 chain = "[w X' b Y Z t]"
 [plan]
-lines = ["ppp"]
+lines = ["ppp", "npp", "pnp", "nnp"]
 steps = {steps}
 [head]
 layout = "ideal"
@@ -96,7 +96,7 @@ def free_port() -> int:
 def main() -> None:
     points = int(sys.argv[1]) if len(sys.argv) > 1 else round(HOURS * 3600.0 / SECONDS_A_READING)
     with tempfile.TemporaryDirectory() as temporary:
-        measure(Path(temporary), (points - 1) // 3)
+        measure(Path(temporary), (points // 4 - 1) // 3)
 
 
 def measure(folder: Path, steps: int) -> None:
@@ -115,7 +115,7 @@ def measure(folder: Path, steps: int) -> None:
     entrance.request("GET", found[2])
     cookie = (entrance.getresponse().getheader("set-cookie") or "").split(";")[0]
     known = read_scenario("vmc.toml").known
-    (visit,) = visits_of(known)
+    places = [(visit, index) for visit in visits_of(known) for index in range(len(visit.points))]
     asked = free_port()
     with Twin("vmc.toml", protocol="lines") as twin:
         acquire = subprocess.Popen(
@@ -136,8 +136,9 @@ def measure(folder: Path, steps: int) -> None:
         answers = controller.makefile()
 
         def read(index: int) -> None:
-            twin.instrument.move_to(visit.positions[index])
-            controller.sendall(f"READ {visit.number} {int(visit.points[index])}\n".encode())
+            visit, place = places[index]
+            twin.instrument.move_to(visit.positions[place])
+            controller.sendall(f"READ {visit.number} {int(visit.points[place])}\n".encode())
             answer = answers.readline()
             assert answer.startswith("DONE"), answer
 
@@ -154,23 +155,23 @@ def measure(folder: Path, steps: int) -> None:
             while pages[0].state["reasons"]:
                 time.sleep(0.001)
         start, before = time.monotonic(), [used(acquire.pid), used(app.pid)]
-        early = min(1000, len(visit.points) // 4)
+        early = min(1000, len(places) // 4)
         memory = [before]
-        for index in range(1, len(visit.points) - 1):
+        for index in range(1, len(places) - 1):
             read(index)
             if index == early:
                 memory.append([used(acquire.pid), used(app.pid)])
         took, after = time.monotonic() - start, [used(acquire.pid), used(app.pid)]
-        while pages[1].readings < len(visit.points) - 1 or pages[0].readings < len(visit.points) - 1:
+        while pages[1].readings < len(places) - 1 or pages[0].readings < len(places) - 1:
             time.sleep(0.05)
         ask_for(control_path(raw), "stop")
         acquire.wait()
     app.send_signal(signal.SIGINT)
     app.wait()
     readings = read_raw(raw).readings()
-    assert len(readings) == len(visit.points) - 1
+    assert len(readings) == len(places) - 1
     assert not any(reading.is_lost for reading in readings.values())
-    count = len(visit.points) - 2
+    count = len(places) - 2
     print(f"from beam to page: median {1e3 * statistics.median(delays):.0f} ms, longest {1e3 * max(delays):.0f} ms")
     hours = count * SECONDS_A_READING / 3600.0
     print(f"{count / took:.0f} readings a second, {count} in all ({hours:.1f} h of a machine)")

@@ -48,6 +48,7 @@ class Acquisition:
         self._set_up = 0  # the last set-up for which the instrument was ready
         self._visit = 0  # visit of the last reading
         self._check = PointCheck(known, instrument.columns, header.sign)
+        self._lost_points: set[tuple[int, int]] = set()  # also of visits that are read again
         self._once_more: set[tuple[int, int]] = set()  # readings that are read again
         self.done: dict[tuple[int, int], RawReading] = {}
         self.recorded: list[TemperatureRow] = []
@@ -57,6 +58,7 @@ class Acquisition:
         if content.torn is not None:
             self._operator.tell(content.torn)
         self.done = content.readings()
+        self._lost_points = {key for key, reading in self.done.items() if reading.is_lost}
         self.recorded = [record for record in content.records if isinstance(record, TemperatureRow)]
         if self._temperatures is not None:
             self._temperatures.leave_out(self.recorded)
@@ -232,8 +234,8 @@ class Acquisition:
             self.done.pop(key, None)
             self.done[key] = stored
         nominal = self._header.plan[visit.number - 1].nominal_mm[index]
-        lost = sum(1 for reading in self.done.values() if reading.is_lost)
-        self._operator.stored(self.done[key], nominal, len(self.done), lost)
+        (self._lost_points.add if self.done[key].is_lost else self._lost_points.discard)(key)
+        self._operator.stored(self.done[key], nominal, len(self.done), len(self._lost_points & self.done.keys()))
         return tuple(self.done[key].read)
 
     def _new_temperatures(self) -> list[TemperatureRow]:
