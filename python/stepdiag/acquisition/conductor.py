@@ -237,7 +237,8 @@ class Conductor:
 
     def doing(self, doing: Doing) -> None:
         self.state.doing = doing
-        self._publish()
+        if doing not in ("waits", "reads") or time.monotonic() - self._published >= BETWEEN_STATES:
+            self._publish()
 
     def _publish_sample(self, sample: Sample) -> None:
         if not self._is_followed or time.monotonic() - self._published < BETWEEN_STATES:

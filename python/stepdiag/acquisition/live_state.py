@@ -9,7 +9,7 @@ import json
 import os
 import time
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Self
 
@@ -98,7 +98,7 @@ class LiveFile:
         if self._handle is None:
             return
         self._number += 1
-        content = {"version": VERSION, "number": self._number, **asdict(state), "whole": self._number}
+        content = {"version": VERSION, "number": self._number, **vars(state), "whole": self._number}
         text = json.dumps(content, separators=(",", ":")).encode()
         if len(text) >= ROOM:
             text = json.dumps({**content, "messages": []}, separators=(",", ":")).encode()

@@ -48,7 +48,7 @@ class Acquisition:
         self._set_up = 0  # the last set-up for which the instrument was ready
         self._visit = 0  # visit of the last reading
         self._check = PointCheck(known, instrument.columns, header.sign)
-        self._lost_points: set[tuple[int, int]] = set()  # also of visits that are read again
+        self._lost_points: set[tuple[int, int]] = set()
         self._once_more: set[tuple[int, int]] = set()  # readings that are read again
         self.done: dict[tuple[int, int], RawReading] = {}
         self.recorded: list[TemperatureRow] = []
@@ -76,6 +76,7 @@ class Acquisition:
         first = last if resume == "line" else min(visit.number for visit in self._visits if visit.set_up == set_up)
         self._file.append([Again(time=datetime.now(UTC), visit=first)])
         self.done = {key: reading for key, reading in self.done.items() if key[0] < first}
+        self._lost_points &= self.done.keys()
         self._once_more.clear()
 
     def run(self, source: str, write: Callable[[], None]) -> None:
@@ -235,7 +236,7 @@ class Acquisition:
             self.done[key] = stored
         nominal = self._header.plan[visit.number - 1].nominal_mm[index]
         (self._lost_points.add if self.done[key].is_lost else self._lost_points.discard)(key)
-        self._operator.stored(self.done[key], nominal, len(self.done), len(self._lost_points & self.done.keys()))
+        self._operator.stored(self.done[key], nominal, len(self.done), len(self._lost_points))
         return tuple(self.done[key].read)
 
     def _new_temperatures(self) -> list[TemperatureRow]:
