@@ -242,6 +242,8 @@ def test_state_is_read_whole_while_it_is_overwritten(tmp_path: Path) -> None:
     thread = threading.Thread(target=publish)
     thread.start()
     try:
+        while read_live(path) is None:
+            time.sleep(0.001)
         seen = 0
         for _ in range(2000):
             found = read_live(path)
