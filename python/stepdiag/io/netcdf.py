@@ -8,6 +8,7 @@ import mmap
 import os
 import secrets
 import struct
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -32,6 +33,7 @@ _ROOM = 2**19  # bytes of a file beside its values, at most
 _IN_MEMORY = Path("/dev/shm")
 _CHECKSUM = "sha256"
 _OF_OTHERS = ("history",)  # attributes that other programs add to, as their conventions want
+_LIBRARIES = threading.RLock()  # HDF5 crashes where two threads use it at once
 _FILL = netCDF4.default_fillvals["f8"]  # netCDF's mark of values never written
 
 
@@ -64,7 +66,8 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
 def _packed(dataset: xr.Dataset, path: Path) -> memoryview:
     """The content of a file, made in memory if there is room, else beside `path`: where a disk fails, the C libraries
     crash."""
-    with uninterrupted(), ExitStack() as stack:  # an exception inside of the libraries leaves their locks taken
+    # An exception inside of the libraries leaves their locks taken.
+    with _LIBRARIES, uninterrupted(), ExitStack() as stack:
         try:
             scratch, handle = stack.enter_context(_scratch(_IN_MEMORY, dataset.nbytes + _ROOM))
         except OSError:
@@ -97,19 +100,20 @@ def open_dataset(path: Path) -> Iterator["NetcdfFile"]:
     Raises InvalidArgument naming the file for any fault in it."""
     content = read_bytes(path)
     _check_heaps(content, path)
-    try:
-        file = netCDF4.Dataset("memory.nc", memory=content)
-        _check_size(file, len(content), path)
-        store = NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
-        dataset = xr.open_dataset(store, decode_times=False, decode_timedelta=False)
-    except InvalidArgument:
-        raise
-    except Exception as error:  # the libraries raise anything for a damaged file
-        raise InvalidArgument(f"{path}: expected a netCDF file: {_one_line(error)}") from None
-    with dataset:
-        file_of = NetcdfFile(path, dataset)
-        file_of.check()
-        yield file_of
+    with _LIBRARIES:
+        try:
+            file = netCDF4.Dataset("memory.nc", memory=content)
+            _check_size(file, len(content), path)
+            store = NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
+            dataset = xr.open_dataset(store, decode_times=False, decode_timedelta=False)
+        except InvalidArgument:
+            raise
+        except Exception as error:  # the libraries raise anything for a damaged file
+            raise InvalidArgument(f"{path}: expected a netCDF file: {_one_line(error)}") from None
+        with dataset:
+            file_of = NetcdfFile(path, dataset)
+            file_of.check()
+            yield file_of
 
 
 class NetcdfFile:

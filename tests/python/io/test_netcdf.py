@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -268,3 +269,16 @@ def test_file_is_replaced_with_its_permissions_behind_its_link(tmp_path: Path) -
     assert (tmp_path / "target.nc").stat().st_mode & 0o777 == 0o640
     assert same_run(sd.read_measurement(tmp_path / "target.nc"), simulate(1))
     assert len(os.listdir(tmp_path)) == 2
+
+
+def test_threads_read_and_write_at_once(tmp_path: Path, adjustment: tuple[sd.Adjustment, sd.Measurement]) -> None:
+    """HDF5 crashes where two threads use it at once."""
+    calibration = adjustment[0].calibration
+
+    def work(number: int) -> None:
+        for _ in range(10):
+            calibration.write(tmp_path / f"{number}.nc")
+            assert same_calibration(sd.read_calibration(tmp_path / f"{number}.nc"), calibration)
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(work, range(4))) == [None] * 4

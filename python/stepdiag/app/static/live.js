@@ -248,7 +248,7 @@ class LivePage {
       return made;
     };
     const parts = [];
-    for (const value of [low, 0, high]) {
+    for (const value of new Set([low, 0, high])) {
       parts.push(element("line", { x1: left, x2: right, y1: y(value), y2: y(value), class: "grid" }));
       const apart = value === 0 || Math.abs(y(value) - y(0)) > 14;
       if (apart) parts.push(element("text", { x: left - 6, y: y(value) + 4, "text-anchor": "end" }, local(value, 1)));
