@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import click
 
@@ -194,6 +194,16 @@ def selftest(context: click.Context, output: OutputFile | None, as_json: bool) -
 @click.option("--separator", type=click.Choice(["comma", "semicolon", "tab"]), help="Separator of fields.")
 @click.option("--decimal", type=click.Choice(["point", "comma"]), help="Decimal mark of numbers.")
 @click.option("--sheet", metavar="NAME", help="Sheet of the workbook.  [default: the one with the heads]")
+@click.option("--hidden", type=click.Choice(["take", "leave"]), help="Hidden rows and columns of workbooks.")
+@click.option("--first-point", type=click.IntRange(0, 1), metavar="0|1", help="Number of the first point of a line.")
+@click.option(
+    "--origin",
+    type=float,
+    nargs=3,
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    help="The sheet's coordinates of home, mm.",
+)
 @click.option("--scenario", type=PATH, metavar="FILE", help="Take the commanded positions from this scenario's plan.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing measurement of this name.")
 def import_(
@@ -203,6 +213,9 @@ def import_(
     separator: str | None,
     decimal: str | None,
     sheet: str | None,
+    hidden: Literal["take", "leave"] | None,
+    first_point: int | None,
+    origin: tuple[float, float, float],
     scenario: Path | None,
     overwrite: bool,
 ) -> None:
@@ -232,6 +245,9 @@ def import_(
             separator=separator,
             decimal=decimal,
             sheet=sheet,
+            hidden=hidden,
+            first_point=first_point,
+            origin=origin,
             plan=described.known.plan if described else None,
         )
     write_measurement(found.measurement, path)

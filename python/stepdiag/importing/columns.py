@@ -10,12 +10,14 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import Context, Decimal
 from typing import Final
 
 from stepdiag._core import InvalidArgument
 
 _PI: Final = Decimal("3.14159265358979323846264338327950288419716939937511")
+_ATMOSPHERE: Final = Decimal(101325)  # Pa
+_FIVE_NINTHS: Final = Context(prec=60).divide(Decimal(5), Decimal(9))
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,9 @@ def _units(spellings: Mapping[str, str | Decimal]) -> dict[str, SheetUnit]:
 
 # By what they measure. Native units: mm, rad, s, °C, Pa, 1.
 UNITS: Final[Mapping[str, Mapping[str, SheetUnit]]] = {
-    "length": _units({"mm": "1", "µm um": "1e-3", "m": "1e3", "cm": "10", "nm": "1e-6"}),
+    "length": _units(
+        {"mm": "1", "µm um": "1e-3", "m": "1e3", "cm": "10", "nm": "1e-6", 'in inch inches " ″ ”': "25.4"}
+    ),
     "angle": _units(
         {
             "µrad urad": "1e-6",
@@ -50,8 +54,22 @@ UNITS: Final[Mapping[str, Mapping[str, SheetUnit]]] = {
         }
     ),
     "time": _units({"s": "1", "ms": "1e-3", "min": "60", "h": "3600"}),
-    "temperature": {**_units({"°C C degC": "1"}), "k": SheetUnit("K", Decimal(1), Decimal("-273.15"))},
-    "pressure": _units({"hPa mbar": "100", "Pa": "1", "kPa": "1000"}),
+    "temperature": {
+        **_units({"°C C degC": "1"}),
+        "k": SheetUnit("K", Decimal(1), Decimal("-273.15")),
+        **{word: SheetUnit("°F", _FIVE_NINTHS, Decimal(-32)) for word in ("°f", "f", "degf")},
+    },
+    # Columns of mercury at 0 °C and standard gravity, as NIST SP 811 converts them.
+    "pressure": _units(
+        {
+            "hPa mbar": "100",
+            "Pa": "1",
+            "kPa": "1000",
+            "mmHg": "133.322387415",
+            "Torr": _ATMOSPHERE / 760,
+            "inHg": "3386.388640341",
+        }
+    ),
     "humidity": _units({"% percent": "0.01"}),
 }
 _EVERY_UNIT: Final = {word for units in UNITS.values() for word in units}
@@ -72,6 +90,9 @@ _RECORDS: Final = {
 _UNIT_OF_UNCERTAINTY: Final = {"length": "µm", "angle": "µrad"}
 
 
+CLOCK: Final = SheetUnit("clock time", Decimal(1))  # of a column of times whose head has no unit
+
+
 @dataclass(frozen=True)
 class Column:
     """A column of a sheet: where it is, its head, the channel it holds (distance, u_distance, x, line …)."""
@@ -85,6 +106,8 @@ class Column:
     @property
     def meaning(self) -> str:
         unit = "" if self.unit is None else f" in {self.unit.name}"
+        if self.unit == CLOCK:
+            unit = " by the clock, counted from the first one"
         return f"{'minus ' if self.sign < 0 else ''}{self.name}{unit}"
 
 
@@ -145,6 +168,23 @@ def split_head(head: str) -> tuple[str, str | None]:
         return name, None
     suffixed = re.fullmatch(r"(.+?)(?:\s+in\s+|[\s_\-./]+)([^\s_\-./]+)", text)
     return (_words(suffixed[1]), suffixed[2]) if suffixed else (name, None)
+
+
+def same_unit(head: str, own: str, word: str) -> bool:
+    """Whether two words are the same unit of what a head measures; of an unknown column whether they are alike."""
+    units = UNITS.get(quantity_of(split_head(head)[0]) or "", {})
+    one, other = units.get(plain(own)), units.get(plain(word))
+    return one == other if one and other else plain(own) == plain(word)
+
+
+def unit_in(word: str, quantity: str) -> SheetUnit | None:
+    """The unit that a word names among those of a quantity."""
+    return UNITS[quantity].get(plain(word))
+
+
+def is_unit(word: str) -> bool:
+    """Whether a word is a unit of anything."""
+    return plain(word) in _EVERY_UNIT
 
 
 def find_heads(heads: Sequence[str], mappings: Sequence[Mapped]) -> bool:
@@ -219,6 +259,8 @@ def _recognised(index: int, head: str) -> Column | None:
 
 
 def _unit_of(head: str, name: str, word: str | None) -> SheetUnit:
+    if name == "time" and (word is None or plain(word) in ("hh:mm", "hh:mm:ss", "h:m:s", "clock")):
+        return CLOCK
     units = UNITS[str(quantity_of(name))]
     names = list(dict.fromkeys(unit.name for unit in units.values()))
     if word is None:

@@ -1,5 +1,6 @@
 """Numbers as spreadsheet programs write them: decimal point or comma, from all fields of a file."""
 
+import datetime
 import re
 from collections.abc import Sequence
 from decimal import Context, Decimal
@@ -79,6 +80,59 @@ def number(text: str, mark: str) -> Decimal | None:
         return None
     kept = re.sub(rf"[{group}'’\s]", "", text)
     return Decimal(kept.replace(",", "."))
+
+
+def shown_by(code: str) -> tuple[Decimal, str]:
+    """By what a number format of a workbook multiplies what it shows, and the text that it shows beside it.
+
+    "0.0%" multiplies by 100, a comma behind the digits divides by 1000, text stands in quotes or behind a backslash.
+    The part for numbers above 0 decides (ECMA-376-1, 18.8.31)."""
+    factor, text, is_after_digit, k = Decimal(1), "", False, 0
+    while k < len(code) and code[k] != ";":
+        mark = code[k]
+        if mark == '"' or mark == "[":
+            end = code.find('"' if mark == '"' else "]", k + 1)
+            end = len(code) if end < 0 else end
+            text += code[k + 1 : end] if mark == '"' else ""
+            k = end
+        elif mark in "\\_*":  # the next one is shown, or as wide, or repeated
+            text += code[k + 1 : k + 2] if mark == "\\" else ""
+            k += 1
+        elif mark == "%":
+            factor *= 100
+        elif mark == "," and is_after_digit:
+            if not re.match(r",*[0#?]", code[k:]):
+                factor /= 1000
+        elif mark not in "0#?.,+-() Ee/":
+            text += mark
+        is_after_digit = mark in "0#?" or (mark == "," and is_after_digit)
+        k += 1
+    return factor, text.strip(" []()\u00a0")
+
+
+_CLOCK: Final = re.compile(
+    r"(?:(\d{4})-(\d\d)-(\d\d)[T ]|(\d{1,2})\.(\d{1,2})\.(\d{4}),? )?"
+    r"(\d{1,3}):([0-5]\d)(?::([0-5]\d(?:[.,]\d{1,9})?))?",
+    re.ASCII,
+)
+
+
+def clock(text: str) -> tuple[int | None, Decimal] | None:
+    """Day (counted from the year 1) and seconds of the day of a clock time such as 10:23:45.5, 2026-11-28 10:23 or
+    28.11.2026 10:23:45; without a date the day is None. None for another text."""
+    found = _CLOCK.fullmatch(text.strip())
+    if found is None:
+        return None
+    year, month, day, german_day, german_month, german_year, hours, minutes, seconds = found.groups()
+    second = Decimal((seconds or "0").replace(",", "."))
+    of_day = 3600 * int(hours) + 60 * int(minutes) + second
+    given = (year, month, day) if year else (german_year, german_month, german_day)
+    if given[0] is None:
+        return None, of_day
+    try:
+        return datetime.date(*map(int, given)).toordinal(), of_day
+    except ValueError:
+        return None
 
 
 def native(value: Decimal, unit: SheetUnit, sign: int = 1) -> float:

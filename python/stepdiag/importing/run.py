@@ -1,17 +1,35 @@
 """Sheets to one measurement."""
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from stepdiag._core import InvalidArgument, Measurement, Plan
 from stepdiag.config.toml_text import located
-from stepdiag.importing.columns import LABELS, POSITIONS, Column, Mapped, columns_of, is_signal, parse_mapping
-from stepdiag.importing.numbers import decimal_mark, is_lost, native, number
-from stepdiag.importing.sheet import Cell, Sheet, read_sheet
+from stepdiag.importing.columns import (
+    CLOCK,
+    LABELS,
+    POSITIONS,
+    Column,
+    Mapped,
+    columns_of,
+    is_signal,
+    is_unit,
+    parse_mapping,
+    quantity_of,
+    unit_in,
+)
+from stepdiag.importing.numbers import clock, decimal_mark, is_lost, native, number, shown_by
+from stepdiag.importing.sheet import Cell, Formatted, Hidden, Sheet, read_sheet
+
+_SIGNS: Final = str.maketrans("+-\N{MINUS SIGN}", "pnn")
+_DAY: Final = 86_400  # s
 
 
 @dataclass(frozen=True)
@@ -32,6 +50,19 @@ class _Rows:
     run: list[int] = field(default_factory=list)
     direction: list[str] = field(default_factory=list)
     numbers: dict[str, list[float]] = field(default_factory=dict)
+    first_time: tuple[int | None, Decimal] | None = None  # day and second of the first clock time
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What the user says of all files."""
+
+    mappings: Sequence[Mapped]
+    decimal: str | None
+    plan: Plan | None
+    hidden: Hidden | None
+    first_point: int | None
+    origin: tuple[float, float, float]
 
 
 def import_files(
@@ -42,6 +73,9 @@ def import_files(
     decimal: str | None = None,
     sheet: str | None = None,
     plan: Plan | None = None,
+    hidden: Hidden | None = None,
+    first_point: int | None = None,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Imported:
     """Read sheets in the forms of spreadsheet programs as one measurement.
 
@@ -52,15 +86,19 @@ def import_files(
         decimal: "point" or "comma"; found if None.
         sheet: name of the sheet of workbooks; found if None.
         plan: gives the commanded positions of sheets that have none.
+        hidden: "take" or "leave" hidden rows and columns; a sheet that has any is refused if None.
+        first_point: number that the sheets give to the first point of a line, 0 or 1; found if None.
+        origin: the sheets' coordinates of home, mm.
 
     Raises:
         InvalidArgument: a file cannot be read, or in two ways; names file, place and what decides.
     """
     mappings = [parse_mapping(text) for text in column]
+    said = _Said(mappings, decimal, plan, hidden, first_point, origin)
     rows = _Rows()
     text: list[str] = []
     for path in files:
-        text += _add(rows, read_sheet(path, mappings, separator, sheet), mappings, decimal, plan)
+        text += _add(rows, read_sheet(path, mappings, separator, sheet, hidden), said)
     _reject_repeated(rows)
     channels = {name: values for name, values in rows.numbers.items() if name not in POSITIONS and name[:2] != "u_"}
     uncertainties = {name[2:]: np.array(values) for name, values in rows.numbers.items() if name[:2] == "u_"}
@@ -82,11 +120,12 @@ def import_files(
     return Imported(measurement, tuple(text))
 
 
-def _add(rows: _Rows, sheet: Sheet, mappings: Sequence[Mapped], decimal: str | None, plan: Plan | None) -> list[str]:
+def _add(rows: _Rows, sheet: Sheet, said: _Said) -> list[str]:
     """Adds the rows of a sheet; returns what it was taken for."""
-    path = sheet.path
+    path, plan = sheet.path, said.plan
     try:
-        taken, left_out = columns_of(sheet.heads, mappings)
+        taken, left_out = columns_of(sheet.heads, said.mappings)
+        taken, unseen = _not_hidden(taken, sheet, said.hidden)
     except InvalidArgument as error:
         raise InvalidArgument(f"{path}, {sheet.head_place}: {error}") from None
     columns = {column.name: column for column in taken}
@@ -99,13 +138,20 @@ def _add(rows: _Rows, sheet: Sheet, mappings: Sequence[Mapped], decimal: str | N
         )
     if not sheet.rows:
         raise InvalidArgument(f"{path}: has heads but no rows")
-    mark = _mark(sheet, taken, decimal)
+    mark = _mark(sheet, taken, said.decimal)
     start = len(rows.line)
+    above: dict[str, Cell] = {}
+    is_filled = False
     for place, cells in sheet.rows:
         where = f"{path}, {place}"
-        labels = {name: cells[columns[name].index] for name in LABELS if name in columns}
+        labels: dict[str, Cell] = {name: cells[columns[name].index] for name in LABELS if name in columns}
+        if labels["line"] == "" and above:  # written once for all rows of a line
+            is_filled = True
+            labels |= {name: above[name] for name in labels if name != "point" and labels[name] == ""}
+        above = labels
         rows.places.append(where)
-        rows.line.append(str(labels["line"]).lower())
+        line = str(labels["line"]).lower()
+        rows.line.append(line if set(line) & set("pn") else line.translate(_SIGNS))
         rows.point.append(_integer(labels["point"], mark, f"{where}: point"))
         empty_run = labels.get("run", "") == ""
         rows.run.append(0 if empty_run else _integer(labels["run"], mark, f"{where}: run"))
@@ -115,11 +161,22 @@ def _add(rows: _Rows, sheet: Sheet, mappings: Sequence[Mapped], decimal: str | N
         rows.direction.append(direction)
         _reject_line(rows, where)
     count = len(rows.line)
+    numbered = _count_from_0(rows, start, said)
+    for place, index in sheet.repeated:
+        column = next((one for one in taken if one.index == index), None)
+        if column is not None and (is_signal(column.name) or column.name.startswith("u_")):
+            raise InvalidArgument(f"{path}, {place}: {column.head}: cells of readings are merged: split them")
     values = {
-        c.name: [_value(cells[c.index], c, mark, f"{path}, {place}") for place, cells in sheet.rows]
+        c.name: (
+            _clock_times(rows, sheet, c)
+            if c.unit == CLOCK
+            else [_value(cells[c.index], c, mark, f"{path}, {place}") for place, cells in sheet.rows]
+        )
         for c in taken
         if c.unit is not None
     }
+    for axis, home in zip(given, said.origin, strict=False):
+        values[axis] = [position - home for position in values[axis]]
     if not given and plan is not None:
         values |= _planned(rows, start, plan)
     for name in {**rows.numbers, **values}:
@@ -129,7 +186,87 @@ def _add(rows: _Rows, sheet: Sheet, mappings: Sequence[Mapped], decimal: str | N
     text = [f"{path}: {form}; heads in {sheet.head_place}"]
     text += [f"  {column.head}: {column.meaning}" for column in taken]
     text += ["  x, y, z: from the plan"] if not given else []
-    return text + [f"  {head}: left out" for head in left_out]
+    text += ["  empty cells of the line: as above"] if is_filled else []
+    text += ["  points are counted from 1 in the file"] if numbered else []
+    return [*text, *(f"  {head}: left out" for head in left_out), *unseen, *sheet.said]
+
+
+def _not_hidden(taken: Sequence[Column], sheet: Sheet, hidden: Hidden | None) -> tuple[list[Column], list[str]]:
+    """The columns without hidden ones, where these are left, and what is said of them."""
+    unseen = [column for column in taken if column.index in sheet.hidden_columns]
+    if unseen and hidden is None:
+        raise InvalidArgument(
+            f'the column "{unseen[0].head}" is hidden: `hidden` take or `hidden` leave says what becomes of it'
+        )
+    said = [f"  {column.head}: hidden, {'taken' if hidden == 'take' else 'left out'}" for column in unseen]
+    if hidden != "leave":
+        return list(taken), said
+    for column in unseen:
+        if column.name in ("line", "point"):
+            raise InvalidArgument(f'the column "{column.head}" is hidden, and cannot be left out')
+    return [column for column in taken if column not in unseen], said
+
+
+def _count_from_0(rows: _Rows, start: int, said: _Said) -> bool:
+    """Numbers points from 0, where a file counts from 1. Returns whether it does.
+
+    Raises InvalidArgument where nothing tells a file that counts from 1 from one whose first points are missing."""
+    last: dict[tuple[str, int], int] = {}
+    first: dict[tuple[str, int], int] = {}
+    for k in range(start, len(rows.line)):
+        key, point = (rows.line[k], rows.run[k]), rows.point[k]
+        first[key], last[key] = min(first.get(key, point), point), max(last.get(key, point), point)
+    counts_from = said.first_point
+    if counts_from is None:
+        if set(first.values()) != {1}:
+            return False
+        plan = said.plan
+        known = (
+            {}
+            if plan is None
+            else {key: plan.points(*key) for key in first if key[0] in (*plan.lines, *plan.scale_lines)}
+        )
+        if not any(last[key] == len(points) for key, points in known.items()):
+            raise InvalidArgument(
+                f"{rows.places[start]}: all lines begin with point 1: `first_point` 1 if the file counts from 1, "
+                "`first_point` 0 if the first point of each line is missing"
+            )
+        counts_from = 1
+    if counts_from == 0:
+        return False
+    for k in range(start, len(rows.line)):
+        rows.point[k] -= counts_from
+        if rows.point[k] < 0:
+            raise InvalidArgument(f"{rows.places[k]}: point: expected a number of at least {counts_from}")
+    return True
+
+
+def _clock_times(rows: _Rows, sheet: Sheet, column: Column) -> list[float]:
+    """Seconds since the first clock time of all files; one that goes back by more than half a day is of the next."""
+    found: list[float] = []
+    before, days = Decimal(0), 0
+    for place, cells in sheet.rows:
+        where, cell = f"{sheet.path}, {place}: {column.head}", cells[column.index]
+        if isinstance(cell, str) and is_lost(cell):
+            found.append(float("nan"))
+            continue
+        time = clock(cell) if isinstance(cell, str) else None
+        if time is None:
+            raise InvalidArgument(
+                f"{where}: expected a clock time such as 10:23:45, got {cell!r}; a number needs a unit: "
+                f'`column` "{column.head}=time [s]"'
+            )
+        rows.first_time = rows.first_time or time
+        day, second = time
+        if (day is None) != (rows.first_time[0] is None):
+            raise InvalidArgument(f"{where}: expected times that all have a date, or none, got {cell!r}")
+        if day is None:
+            days += second < before - _DAY // 2
+            before = second
+        else:
+            days = day - (rows.first_time[0] or 0)
+        found.append(float(_DAY * days + second - rows.first_time[1]))
+    return found
 
 
 def _reject_line(rows: _Rows, where: str) -> None:
@@ -142,10 +279,10 @@ def _reject_line(rows: _Rows, where: str) -> None:
 
 def _mark(sheet: Sheet, taken: Sequence[Column], decimal: str | None) -> str:
     fields = [
-        (f"{sheet.path}, {place}: {column.head}", text)
+        (where := f"{sheet.path}, {place}: {column.head}", _without_unit(text, column, where))
         for place, cells in sheet.rows
         for column in taken
-        if column.unit is not None and isinstance(text := cells[column.index], str) and not is_lost(text)
+        if column.unit not in (None, CLOCK) and isinstance(text := cells[column.index], str) and not is_lost(text)
     ]
     if not fields and decimal is None:
         return ""  # all numbers are cells of a workbook
@@ -161,13 +298,47 @@ def _value(cell: Cell, column: Column, mark: str, where: str) -> float:
         if column.name in POSITIONS:
             raise InvalidArgument(f"{where}: {column.head}: expected a commanded position, got {cell!r}")
         return float("nan")
-    value = number(cell, mark) if isinstance(cell, str) else Decimal(repr(cell))
+    value = number(_without_unit(cell, column, where), mark) if isinstance(cell, str) else Decimal(repr(cell))
     if value is None or not value.is_finite():
         raise InvalidArgument(f"{where}: {column.head}: expected a number, got {cell!r}")
+    if isinstance(cell, Formatted):
+        value = _as_shown(value, cell.code, column, where)
     result = native(value, column.unit, column.sign)
     if column.name.startswith("u_") and not 1e-12 <= result <= 1e6:
         raise InvalidArgument(f"{where}: {column.head}: expected a standard uncertainty above 0, got {cell!r}")
     return result
+
+
+def _without_unit(text: str, column: Column, where: str) -> str:
+    """The number in "62 %", in a column of %. Raises InvalidArgument for another unit."""
+    found = re.fullmatch(r"(.*\d[.,]?)\s*(\D+)", text.strip())
+    if found is None or not is_unit(found[2]):
+        return text
+    if column.unit is None or unit_in(found[2], str(quantity_of(column.name))) != column.unit:
+        unit = "" if column.unit is None else column.unit.name
+        raise InvalidArgument(f"{where}: {text!r} is not in {unit}, as the head says: make them alike")
+    return found[1]
+
+
+def _as_shown(value: Decimal, code: str, column: Column, where: str) -> Decimal:
+    """The value as people see it in the workbook, in the column's unit. Raises InvalidArgument where that is something
+    else than the head says."""
+    assert column.unit is not None
+    factor, words = shown_by(code)
+    shown = value * factor
+    unit = unit_in(words, str(quantity_of(column.name)))
+    if factor == 100 and unit is None and column.unit.name == "%":
+        return shown  # 62 % is the number 0.62
+    if unit is None and factor == 1 and not is_unit(words):
+        return value
+    seen, meant = native(shown, unit or column.unit), native(value, column.unit)
+    if (unit is not None or not words) and math.isclose(seen, meant, rel_tol=1e-9, abs_tol=1e-15):
+        return value
+    percent = " %" if factor == 100 and not words else ""
+    raise InvalidArgument(
+        f"{where}: {column.head}: the cell shows {shown.normalize():f}{percent}{' ' if words else ''}{words}, "
+        f"but is {value.normalize():f} {column.unit.name} by its head: make them alike"
+    )
 
 
 def _integer(cell: Cell, mark: str, where: str) -> int:
