@@ -29,7 +29,7 @@ BELOW: dict[str, set[str]] = {
     "positions": {"io"},
     "head": {"io"},
     "scenario": {"head"},
-    "importing": {"scenario"},
+    "importing": {"scenario", "positions"},
     "uncertainty": {"scenario"},
     "planning": {"uncertainty", "rechecking"},
     "program": {"planning", "option_field"},

@@ -47,9 +47,10 @@ def positions(
 ) -> None:
     """Evaluate repeated readings of targets, or predict what they would show.
 
-    FILE with readings (CSV: target_mm, direction, cycle, and deviation_um or position_mm): reports
-    accuracy A, systematic error E and M, repeatability R and reversal error B of the axis (ISO 230-2)
-    or the diagonal (ISO 230-6).
+    FILE with readings: reports accuracy A, systematic error E and M, repeatability R and reversal
+    error B of the axis (ISO 230-2) or the diagonal (ISO 230-6). It is CSV (target_mm, direction,
+    cycle, and deviation_um or position_mm), a linear test of Renishaw's (.rtl), or a table or
+    workbook with targets in rows and runs in columns ("Target [mm]", "Run 1 + [µm]", …).
 
     FILE with a calibration (CSV or netCDF): reports the systematic part of these figures, E, M and B,
     along the three axes through home and the four body diagonals, or along one line of your choice.
@@ -103,12 +104,18 @@ def positions(
 
 
 def _evaluate(file: Path, as_json: bool) -> None:
+    from stepdiag.importing.position_table import is_position_table, read_position_table
     from stepdiag.positions.evaluation import evaluate_positions
     from stepdiag.positions.readings import read_positions
     from stepdiag.presentation.blocks import text_of
     from stepdiag.presentation.positions import measured_blocks, measured_warnings
 
-    readings = read_positions(file)
+    if is_position_table(file):
+        readings, said = read_position_table(file)
+        for line in said:
+            tell("note", line)
+    else:
+        readings = read_positions(file)
     try:
         result = evaluate_positions(readings)
     except InvalidArgument as error:

@@ -78,6 +78,27 @@ def read_sheet(
     `separator`: a key of SEPARATORS; `page`: the name of a workbook's sheet. Both are found if they are None.
     `hidden`: whether hidden rows are taken; None: a sheet that has any is refused. Raises InvalidArgument naming the
     file, and what would decide where two ways of reading make sense."""
+    found = _found(path, separator, page)
+    seen = [one for one in found if page is not None or not one.is_hidden]
+    sheets = [sheet for one in seen if (sheet := _below_heads(path, one, mappings, hidden))]
+    if not sheets:
+        unseen = [one.form for one in found if one.is_hidden and _heads_of(one, mappings) is not None]
+        if unseen:
+            raise InvalidArgument(f"{path}: {unseen[0]} has heads, but is hidden: `sheet` takes it by its name")
+        raise InvalidArgument(f"{path}: {_no_heads(found)}")
+    if len(sheets) > 1:
+        option = "sheet" if sheets[0].form.startswith("sheet") else "separator"
+        ways = " and with ".join(sheet.form for sheet in sheets)
+        raise InvalidArgument(f"{path}: makes sense with {ways}: `{option}` decides")
+    return sheets[0]
+
+
+def pages_of(path: Path) -> list[tuple[str, Rows]]:
+    """The form and the rows of each sheet, or of each way to separate fields. Raises InvalidArgument."""
+    return [(page.form, page.rows) for page in _found(path, None, None) if not page.is_hidden]
+
+
+def _found(path: Path, separator: str | None, page: str | None) -> list[_Page]:
     content = read_bytes(path)
     if len(content) > LARGEST_TEXT:
         raise InvalidArgument(f"{path}: larger than {LARGEST_TEXT // 2**20} MiB")
@@ -88,19 +109,7 @@ def read_sheet(
         raise InvalidArgument(f"{path}: is no workbook, and has no `sheet`")
     if is_workbook and separator is not None:
         raise InvalidArgument(f"{path}: is a workbook, and has no `separator`")
-    found = _pages(path, content, page) if is_workbook else _texts(path, content, separator)
-    seen = [one for one in found if page is not None or not one.is_hidden]
-    sheets = [sheet for one in seen if (sheet := _below_heads(path, one, mappings, hidden))]
-    if not sheets:
-        unseen = [one.form for one in found if one.is_hidden and _heads_of(one, mappings) is not None]
-        if unseen:
-            raise InvalidArgument(f"{path}: {unseen[0]} has heads, but is hidden: `sheet` takes it by its name")
-        raise InvalidArgument(f"{path}: {_no_heads(found)}")
-    if len(sheets) > 1:
-        option = "sheet" if is_workbook else "separator"
-        ways = " and with ".join(sheet.form for sheet in sheets)
-        raise InvalidArgument(f"{path}: makes sense with {ways}: `{option}` decides")
-    return sheets[0]
+    return _pages(path, content, page) if is_workbook else _texts(path, content, separator)
 
 
 def _texts(path: Path, content: bytes, separator: str | None) -> list[_Page]:

@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from os import PathLike
@@ -14,7 +14,9 @@ from stepdiag._core import InvalidArgument
 from stepdiag.display import Displayed, Facts
 from stepdiag.io.csv_text import finite_number
 from stepdiag.io.file_kind import head_of
-from stepdiag.io.whole_files import read_text
+from stepdiag.io.sheet_text import decode
+from stepdiag.io.whole_files import read_bytes, read_text
+from stepdiag.positions.rtl import is_rtl, readings_of_rtl
 from stepdiag.units import MICROMETRE
 from stepdiag.wrong_arguments import checked
 
@@ -77,20 +79,33 @@ class PositionReadings(Displayed):
 
 @checked
 def read_positions(path: str | PathLike[str]) -> PositionReadings:
-    """Read repeated readings of targets (CSV).
+    """Read repeated readings of targets: CSV, or a linear test of Renishaw's (.rtl).
 
     Columns, in any order: target_mm, direction (+ or -), cycle (integer), and either deviation_um (actual less target)
     or position_mm (actual). An empty last field is a lost reading. Raises InvalidArgument naming file and line."""
+    content = read_bytes(Path(path))
+    if is_rtl(content):
+        rows, line = readings_of_rtl(decode(content)[0], str(path))
+        read = [(where, target, direction, cycle, um * MICROMETRE) for where, target, direction, cycle, um in rows]
+        return readings_of(read, line, str(path))
     text = read_text(Path(path))
     comments, _ = head_of(text)
     leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
-    rows = _rows(text, str(path))
+    return readings_of(_read(text, str(path)), leading.get("line", ""), str(path))
+
+
+# Where, set-point (mm), direction, cycle, deviation (mm; None: lost).
+PositionRow = tuple[str, float, str, int, float | None]
+
+
+def _read(text: str, path: str) -> list[PositionRow]:
+    rows = _rows(text, path)
     at_line, header = next(rows, (0, []))
     if not header:
         raise InvalidArgument(f"{path}: the file has no rows")
     columns = [name.strip() for name in header]
     value_column = _value_column(columns, f"{path}, line {at_line}")
-    read: list[tuple[str, float, str, int, float | None]] = []  # where, set-point, direction, cycle, deviation
+    read: list[PositionRow] = []
     for at_line, fields in rows:
         where = f"{path}, line {at_line}"
         if len(fields) != len(columns):
@@ -106,6 +121,11 @@ def read_positions(path: str | PathLike[str]) -> PositionReadings:
             value = finite_number(row[value_column], f"{where}: {value_column}")
             deviation = value * MICROMETRE if value_column == "deviation_um" else value - target
         read.append((where, target, row["direction"], int(row["cycle"]), deviation))
+    return read
+
+
+def readings_of(read: Sequence[PositionRow], line: str, path: str) -> PositionReadings:
+    """The readings of a file. Raises InvalidArgument for a reading that is given twice."""
     target_of = _targets([(target, direction, cycle) for _, target, direction, cycle, _ in read])
     deviations: dict[tuple[float, str, int], float] = {}
     keys: set[tuple[float, str, int]] = set()
@@ -121,7 +141,7 @@ def read_positions(path: str | PathLike[str]) -> PositionReadings:
         return PositionReadings(
             tuple(sorted(set(target_of.values()))),
             deviations,
-            leading.get("line", ""),
+            line,
             len(keys) - len(deviations),
             apart if apart > _ROUNDING else 0.0,
         )
