@@ -79,8 +79,7 @@ def new(
     """Add the machine NAME to the book; --book names a new or empty folder to begin a book.
 
     What is known of the machine is written to machines/NAME/machine.toml, which you can edit. With
-    --volume a scenario is written too, with a comment on every key and the defaults of `stepdiag
-    init`.
+    --volume a scenario is written too, as `stepdiag init` does.
     """
     from stepdiag.book.book import Book, find_book
     from stepdiag.book.machine_keys import AboutMachine
@@ -113,7 +112,7 @@ def _new_scenario(
     tilt_noise: float | None,
 ) -> str:
     """The text. Raises InvalidArgument for what no scenario may have."""
-    from stepdiag.config.scenario_template import template
+    from stepdiag.config.scenario_template import short_template
     from stepdiag.head.description import find_shipped_head
     from stepdiag.scenario.description import parse_scenario
 
@@ -125,7 +124,7 @@ def _new_scenario(
         ("noise", "distance_um"): distance_noise,
         ("noise", "tilt_urad"): tilt_noise,
     }
-    text = template(head, {place: value for place, value in stated.items() if value is not None})
+    text = short_template(head, {place: value for place, value in stated.items() if value is not None})
     parse_scenario(text, "scenario.toml")
     return text
 

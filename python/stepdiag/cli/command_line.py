@@ -8,7 +8,7 @@ import io
 import os
 import sys
 from importlib import import_module
-from typing import Final
+from typing import Any, Final
 
 import click
 
@@ -102,6 +102,18 @@ class Commands(click.Group):
             if not near or word.startswith("-"):
                 raise
             raise click.UsageError(f"No such command {args[0]!r}: did you mean {near[0]}?", ctx) from None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """At the end what was written, also of a command whose result is not to be used."""
+        from stepdiag.cli.options import say_outputs
+
+        try:
+            result = super().invoke(ctx)
+        except click.exceptions.Exit:
+            say_outputs(ctx)
+            raise
+        say_outputs(ctx)
+        return result
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -134,7 +134,7 @@ def export(
         from stepdiag.presentation.objects.writer import json_text
 
         click.echo(json_text(export_object(done, read, to, calibration, trust_warnings(calibration, read))))
-    for line in done.told:
+    for line in (*done.report, *(f"wrote {path}" for path in done.files if path != output.path)):
         if line.startswith("warning: "):
             tell("warning", line.removeprefix("warning: "))
         elif not as_json:
@@ -177,4 +177,3 @@ def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
         tell("warning", text)
     for line in program.summary:
         say(line)
-    click.echo(f"wrote {path}")

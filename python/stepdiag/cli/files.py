@@ -1,10 +1,12 @@
 """Commands that create a user's first files, take in those of spreadsheets, and check files and the installation."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import click
+import numpy as np
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, out_file, tell
@@ -12,6 +14,7 @@ from stepdiag.cli.terminal import plain, say
 from stepdiag.io.outputs import MEASUREMENT, SELFTEST, OutputFile
 from stepdiag.progress import Progress
 
+HEADS: Final = ("ideal", "psd", "multi_beam")
 Result = TypeVar("Result")
 
 
@@ -101,15 +104,31 @@ def _found_or_refused(function: Callable[..., Result], *files: Path) -> Result |
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
 @click.option("--head", "head_name", metavar="NAME", help="Start from a copy of this shipped head (see head list).")
-def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> None:
+@click.option("--volume", type=float, nargs=3, metavar="X Y Z", help="Travels to measure, mm.")
+@click.option("--chain", metavar="CHAIN", help='Kinematic chain, such as "[w X\' b Y Z t]".')
+@click.option("--layout", type=click.Choice(HEADS), help="What the head reads.")
+@click.option("--steps", type=int, metavar="N", help="Steps per axis on each line.")
+@click.option("--all-keys", is_flag=True, help="Write every key of a scenario, with comments.")
+def init(
+    output: OutputFile,
+    scenario: Path | None,
+    head_name: str | None,
+    volume: tuple[float, float, float] | None,
+    chain: str | None,
+    layout: str | None,
+    steps: int | None,
+    all_keys: bool,
+) -> None:
     """Start with your own machine: a scenario to edit and a sheet to fill in.
 
-    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points
-    and empty fields for the readings of your instrument. Existing files are never overwritten.
-    After changing the plan in the scenario, make a new sheet with --sheet-for. With --head, the
+    Writes scenario.toml, and measurement.csv with all commanded points and empty fields for the
+    readings of your instrument. On a terminal it asks what no option says. With --head, the
     scenario uses head.toml, a copy of a shipped description, instead of a layout.
+
+    Nothing is overwritten but a sheet without any reading: after changing the scenario, --sheet-for
+    writes it again.
     """
-    from stepdiag.config.scenario_template import template
+    from stepdiag.config.scenario_template import LAYOUTS, short_template, template
     from stepdiag.head.description import find_shipped_head
     from stepdiag.io.data_files import write_measurement
     from stepdiag.io.whole_files import make_folder, read_text, write_whole
@@ -117,23 +136,46 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     from stepdiag.scenario.known import runs_of
     from stepdiag.scenario.planned_readings import empty_sheet
 
-    if scenario is not None and head_name is not None:
-        raise InvalidArgument("--head: goes with a new scenario, not with --sheet-for")
+    of_scenario = {
+        "head": head_name,
+        "volume": volume,
+        "chain": chain,
+        "layout": layout,
+        "steps": steps,
+        "all-keys": all_keys or None,
+    }
+    for option, value in of_scenario.items():
+        if scenario is not None and value is not None:
+            raise InvalidArgument(f"--{option}: goes with a new scenario, not with --sheet-for")
+    if layout is not None and head_name is not None:
+        raise InvalidArgument("--layout: goes with a head that has no description, not with --head")
+    folder = output.path
     texts = {}
     if scenario is not None:
         known = read_scenario(scenario).known
     else:
-        texts["scenario.toml"] = template("head.toml" if head_name else None)
+        _check_free(folder, ["scenario.toml", *(["head.toml"] if head_name else [])])
+        if sys.stdin.isatty() and sys.stdout.isatty():
+            volume, chain, layout, steps = _asked(volume, chain, layout, steps, has_head=head_name is not None)
+        values: dict[tuple[str, str], Any] = {
+            ("machine", "chain"): chain,
+            ("plan", "steps"): steps,
+            ("head", "layout"): layout,
+        }
+        if volume is not None:
+            values |= {("volume", f"{axis}_mm"): travel for axis, travel in zip("xyz", volume, strict=True)}
+        values = LAYOUTS.get(layout or "", {}) | {place: value for place, value in values.items() if value is not None}
+        write = template if all_keys else short_template
+        texts["scenario.toml"] = write("head.toml" if head_name else None, values)
         shipped = find_shipped_head(head_name) if head_name else None
         if shipped is not None:
             texts["head.toml"] = read_text(shipped)
         # Checked as in its new folder, which does not contain the head's copy yet.
-        known = parse_scenario(template(head_name)).known
-    folder = output.path
+        known = parse_scenario(write(head_name, values), "the new scenario").known
     written = [folder / name for name in (*texts, "measurement.csv")]
-    for path in written:
-        if path.exists() or path.is_symlink():
-            raise InvalidArgument(f"{path}: exists already, and is not overwritten")
+    _check_free(folder, texts)
+    if (folder / "measurement.csv").exists():
+        _check_empty(folder / "measurement.csv")
     make_folder(folder)
     for name, text in texts.items():
         write_whole(folder / name, text)
@@ -142,6 +184,51 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     write_measurement(sheet, folder / "measurement.csv")
     for path in written:
         click.echo(f"wrote {path}")
+
+
+def _asked(
+    volume: tuple[float, float, float] | None,
+    chain: str | None,
+    layout: str | None,
+    steps: int | None,
+    *,
+    has_head: bool,
+) -> tuple[tuple[float, float, float], str, str | None, int]:
+    """What a person at a terminal says of what no option has said."""
+    if volume is None:
+        travels = [click.prompt(f"Travel of {axis}, mm", 1000.0, type=float) for axis in "XYZ"]
+        volume = (travels[0], travels[1], travels[2])
+    if chain is None:
+        click.echo(
+            "Kinematic chain from the workpiece w over the bed b to the tool t; a prime marks the axes before b."
+        )
+        chain = click.prompt("Chain", "[w X' b Y Z t]")
+    if layout is None and not has_head:
+        click.echo("ideal: distance and two tilts; psd: distance and spot; multi_beam: three or more distances.")
+        layout = click.prompt("What the head reads", "ideal", type=click.Choice(HEADS))
+    if steps is None:
+        steps = int(click.prompt("Steps per axis on each line", 10, type=int))
+    return volume, str(chain), layout, steps
+
+
+def _check_free(folder: Path, names: Iterable[str]) -> None:
+    for path in (folder / name for name in names):
+        if path.exists() or path.is_symlink():
+            again = f'; after a change of it, "stepdiag init --sheet-for {path} -o {folder}" writes its sheet again'
+            more = again if path.name == "scenario.toml" else ""
+            raise InvalidArgument(f"{path}: exists already, and is not overwritten{more}")
+
+
+def _check_empty(sheet: Path) -> None:
+    """Raise InvalidArgument where a sheet has a reading, or is none."""
+    from stepdiag.io.data_files import read_measurement
+
+    try:
+        values = read_measurement(sheet).channels.values()
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{sheet}: exists already, and is not overwritten ({error})") from None
+    if sheet.is_symlink() or not all(np.isnan(one).all() for one in values):
+        raise InvalidArgument(f"{sheet}: exists already, and is not overwritten: it has readings")
 
 
 @click.command(epilog="\b\nExample: stepdiag selftest -o selftest.txt")
@@ -255,4 +342,3 @@ def import_(
         say(line)
     for warning in odd_columns(found.measurement, described.known.keys if described else None):
         tell("warning", f"{path}: {warning}")
-    click.echo(f"wrote {path}")

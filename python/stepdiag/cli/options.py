@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import Field, fields
+from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -26,6 +26,40 @@ PATH = click.Path(path_type=Path)  # for input files; output files have the type
 SHORT_FLAGS = {"samples": "-n", "output": "-o"}
 
 
+_OUTPUTS: Final = "stepdiag.outputs"  # in a context's meta: by path
+
+
+@dataclass
+class _Output:
+    """A file that a command may write: what it was before, the command's parameters, what is said of it."""
+
+    before: tuple[int, int] | None
+    parameters: Mapping[str, Any]
+    what: str = ""
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    """That changes when a file is written."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
+def say_of_output(path: Path, what: str) -> None:
+    """What is said of a file beside its name, when the command is done."""
+    click.get_current_context().meta[_OUTPUTS][path].what = what
+
+
+def say_outputs(context: click.Context) -> None:
+    """Say which files a command wrote; where standard output is an object, on standard error. Folders have named their
+    files."""
+    for path, output in context.meta.get(_OUTPUTS, {}).items():
+        if path.is_file() and _state(path) != output.before:
+            say(f"wrote {path}{output.what}", err=bool(output.parameters.get("as_json")))
+
+
 class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
     """A file to write, of one of these kinds, or a folder. The value is an OutputFile to claim."""
 
@@ -35,7 +69,10 @@ class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
         self.kinds = kinds
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> OutputFile:
-        return value if isinstance(value, OutputFile) else OutputFile(Path(value), self.kinds)
+        output = value if isinstance(value, OutputFile) else OutputFile(Path(value), self.kinds)
+        if ctx is not None:
+            ctx.meta.setdefault(_OUTPUTS, {})[output.path] = _Output(_state(output.path), ctx.params)
+        return output
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         return [CompletionItem(incomplete, type="file")]

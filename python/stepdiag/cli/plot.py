@@ -64,7 +64,8 @@ def plot(
         with own_style():
             content = save(figure, path.suffix.lower().removeprefix("."))
     write_whole(path, content)
-    click.echo(f"wrote {path}")
+    if output is None:
+        click.echo(f"wrote {path}")
     for file, calibration in drawn.items():
         for warning in trust_warnings(file, calibration):
             tell("warning", warning)

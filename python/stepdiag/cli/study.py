@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, out_file, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, out_file, say_of_output, tell
 from stepdiag.cli.terminal import say
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.interruption import at_end
@@ -58,7 +58,7 @@ def study(
         raise
     finished.remove()
     failures = [result.failure for result in results.values() if result.failure]
-    click.echo(f"wrote {path}: {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
+    say_of_output(output.path, f": {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
     for failure in dict.fromkeys(failures):
         say(f"no result in {failures.count(failure)} cells: {failure}")
     found = list(filter(None, (only_survivors(result.samples, result.lost) for result in results.values())))

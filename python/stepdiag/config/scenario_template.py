@@ -1,4 +1,4 @@
-"""The commented new scenario, made from the scenario's keys."""
+"""New scenarios: a short one, and one with a comment on every key, made from the scenario's keys."""
 
 import textwrap
 from collections.abc import Mapping
@@ -24,6 +24,73 @@ WHY: Final = (
     "all kinds of faults of readings are distinguished. Once, without pp0 and with scale lines read at their ends: "
     "27.8 minutes, 1.52 µm, and a wrong distance is not distinguished from its twin."
 )
+
+
+# Of the short one: what its values are, in a few words.
+_WORDS: Final = {
+    "volume": "travels to measure; home is the corner (0, 0, 0)",
+    "plan": "the best one for 45 minutes: stepdiag plan FILE --minutes N looks for others",
+    "noise": "standard deviations of the instrument's readings",
+    ("machine", "chain"): "from workpiece w over bed b to tool t; a prime marks the axes before b",
+    ("machine", "tool_mm"): "from the tool's origin to the centre of the mirror",
+    ("plan", "steps"): "per axis on each line",
+    ("plan", "scale_lines"): "along one axis, with the laser aligned to it",
+    ("plan", "scale_points"): 'read after every step, or at "ends"',
+    ("plan", "repeats"): "runs of each line",
+    (
+        "head",
+        "layout",
+    ): '"ideal": distance and two tilts; "psd": distance and spot; "multi_beam": three or more distances',
+    ("head", "psd_distance_mm"): "from reference plane to position sensing device",
+    ("head", "beam_offsets_mm"): "(u, v) of each beam in the reference plane",
+    ("head", "description"): "its optics",
+}
+# What a new scenario states where nobody says anything else, in the order of the file; None: only if it is said.
+_SHORT: Final[Mapping[tuple[str, str], Any]] = {
+    ("volume", "x_mm"): 800.0,
+    ("volume", "y_mm"): 600.0,
+    ("volume", "z_mm"): 500.0,
+    ("machine", "chain"): "[w X' b Y Z t]",
+    ("machine", "tool_mm"): (0.0, 0.0, 0.0),
+    **PLAN,
+    ("head", "layout"): "ideal",
+    ("head", "psd_distance_mm"): None,
+    ("head", "beam_offsets_mm"): None,
+    ("head", "description"): None,
+    ("noise", "distance_um"): None,
+    ("noise", "tilt_urad"): None,
+}
+# What a layout needs beside its name.
+LAYOUTS: Final[Mapping[str, dict[tuple[str, str], Any]]] = {
+    "ideal": {},
+    "psd": {("head", "psd_distance_mm"): 50.0},
+    "multi_beam": {("head", "beam_offsets_mm"): [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]]},
+}
+
+
+def short_template(head: str | None = None, values: Mapping[tuple[str, str], Any] | None = None) -> str:
+    """A scenario of the keys that everybody needs. head: a description, in place of a layout. values: of keys, by
+    section and name."""
+    of_head = {("head", "layout"): None, ("head", "description"): head} if head is not None else {}
+    given = {**_SHORT, **of_head, **(values or {})}
+    lines = [
+        "# A scenario for stepdiag: machine, plan and head. The end of a key is its unit.",
+        "# There are more keys: docs/scenario.md; stepdiag init --all-keys writes all of them, with comments.",
+    ]
+    section = ""
+    for (of, name), value in given.items():
+        if value is None:
+            continue
+        if of != section:
+            section = of
+            lines += ["", f"[{section}]" + _behind(section)]
+        lines.append(f"{name} = {show_full(value)}" + _behind((of, name)))
+    return "\n".join(lines) + "\n"
+
+
+def _behind(key: str | tuple[str, str]) -> str:
+    words = _WORDS.get(key)
+    return "" if words is None else f"  # {words}"
 
 
 def template(head: str | None = None, values: Mapping[tuple[str, str], Any] | None = None) -> str:

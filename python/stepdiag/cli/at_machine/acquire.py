@@ -14,7 +14,7 @@ from stepdiag.cli.at_machine.fit_so_far import FitSoFar
 from stepdiag.cli.at_machine.operators import Terminal, Watched
 from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.interrupts import unwinding
-from stepdiag.cli.options import PATH, Writes, made_of, options_of, out_file, tell, tell_inputs
+from stepdiag.cli.options import PATH, Writes, made_of, options_of, out_file, say_of_output, tell, tell_inputs
 from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
@@ -127,7 +127,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
             watched=True,
             after_visit=fits.begin,
         )
-    click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
+    say_of_output(output.path, f": {result.readings} of {result.planned} readings, {result.lost} lost")
 
 
 def _convert(raw: Path, output: OutputFile, options: AcquireOptions) -> None:
@@ -148,7 +148,7 @@ def _convert(raw: Path, output: OutputFile, options: AcquireOptions) -> None:
         uncertainties=options.uncertainties,
         temperature_age=options.temperature_age,
     )
-    click.echo(f"wrote {path}: {len(content.readings())} of {content.planned} readings")
+    say_of_output(output.path, f": {len(content.readings())} of {content.planned} readings")
 
 
 def _options(given: dict[str, Any]) -> AcquireOptions:
