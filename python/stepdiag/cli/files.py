@@ -177,11 +177,11 @@ def init(
     if (folder / "measurement.csv").exists():
         _check_empty(folder / "measurement.csv")
     make_folder(folder)
-    for name, text in texts.items():
-        write_whole(folder / name, text)
     keys = known.keys.plan
     sheet = empty_sheet(known.plan, known.signals, repeats=runs_of(keys), backward=keys.backward)
-    write_measurement(sheet, folder / "measurement.csv")
+    write_measurement(sheet, folder / "measurement.csv")  # first: it is the largest, where a disk is full
+    for name, text in texts.items():
+        write_whole(folder / name, text)
     for path in written:
         click.echo(f"wrote {path}")
 

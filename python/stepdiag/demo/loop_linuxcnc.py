@@ -126,7 +126,7 @@ class Linuxcnc:
         lines = ["(Measuring program of the loop's points)", "G21 G90 G94 G17 G40 G49 G80 G61.1"]
         lines += [line.format(timeout=f"{PATIENCE:g}") for line in HANDSHAKE]
         for index, point in enumerate(job.points):
-            lines.append(writer.move("G0", dict(zip("XYZ", map(float, point), strict=True))))
+            lines.append(writer.move(dict(zip("XYZ", map(float, point), strict=True))))
             lines.append(f"o<reading> call [{number}] [{index}]")
         path.write_text("\n".join([*lines, "M2"]) + "\n")
         return path

@@ -37,7 +37,7 @@ _BEGINNINGS: Final = {
     "SVG picture": r"(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg\b",
     "report page": re.escape(PAGE_BEGINS).replace("en", "[a-z]{2}", 1),
     "PDF document": "%PDF-",
-    "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
+    "measuring program": r"(?i:%\n)?\((?i:measuring program)\b|; Measuring program |0 BEGIN PGM STEPDIAG ",
     "ISG table": "// stepdiag export --to isg\n",
     "file of HAL lines": "# stepdiag export --to (?:matrix|calibxyzkins)\n",
     "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",

@@ -47,7 +47,7 @@ PDF: Final = FileKind("PDF document", (".pdf",))
 FIGURE: Final = (PNG, SVG, PDF)  # endings: style.FORMATS
 PAGE: Final = FileKind("report page", (".html",))
 # Not .nc: a usual ending of programs, but in stepdiag it means netCDF.
-PROGRAM: Final = FileKind("measuring program", (".ngc", ".iso", ".cnc", ".tap", ".mpf", ".txt"))
+PROGRAM: Final = FileKind("measuring program", (".ngc", ".iso", ".cnc", ".tap", ".mpf", ".h", ".txt"))
 KINEMATICS_TABLE: Final = FileKind("calibration", (".csv",))
 SELFTEST: Final = FileKind("self-test", (".txt",))
 ISG_TABLE: Final = FileKind("ISG table", (".csv",))

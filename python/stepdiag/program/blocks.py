@@ -42,19 +42,17 @@ def header(known: Known, options: Options, space: Space, times: Times, visits: l
 
 def _meaning(options: Options) -> str:
     coordinates = writer_of(options).coordinates
+    if options.dialect == "heidenhain":
+        return "of the machine's coordinates, M91" if coordinates == "G53" else "of the active preset"
     return "of the machine's coordinates, G53" if coordinates == "G53" else f"of the work offset {coordinates}"
 
 
 def modes(writer: Writer, trigger: Trigger, options: Options, feed: float) -> list[str]:
-    exact_stop = "G61.1" if writer.dialect == "linuxcnc" else "G61"
     lines = [
-        *writer.comment("mm, absolute, mm/min, exact stop, no radius or length compensation: axis positions"),
-        f"G21 G90 G94 G17 G40 G49 G80 {exact_stop}",
-        *([] if writer.coordinates == "G53" else [writer.coordinates]),
+        *writer.modes(feed * MINUTE),
         *writer.comment("the mirror is where a tool would be: no spindle, no coolant"),
         "M5",
         "M9",
-        f"F{writer.number(feed * MINUTE)}",
     ]
     if trigger == "handshake":
         lines += [line.format(timeout=f"{options.timeout:g}") for line in HANDSHAKE]
@@ -90,10 +88,10 @@ class Body:
                     + (f", but {unlike}" if unlike else "")
                 )
             case Rapid(axis, position):
-                return [writer.move("G0", {AXES[axis]: position})]
+                return [writer.move({AXES[axis]: position})]
             case Feed(position):
                 words = dict(zip(AXES, map(float, position), strict=True))
-                return [writer.move("G1", words)]
+                return [writer.move(words, self.times.feed * MINUTE)]
             case Read(visit, point):
                 return self._read(visit, point)
 

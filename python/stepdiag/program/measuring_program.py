@@ -11,7 +11,7 @@ import numpy as np
 from stepdiag.planning.measuring_time import Times, times_of
 from stepdiag.program.approach import approaches, otherwise
 from stepdiag.program.blocks import Body, header, modes
-from stepdiag.program.gcode import Writer, numbered
+from stepdiag.program.gcode import Writer
 from stepdiag.program.options import Options, space_of, trigger_of, writer_of
 from stepdiag.program.path import Action, Feed, Rapid, Read, SetUp, Space, actions_of
 from stepdiag.scenario.known import Known
@@ -66,14 +66,13 @@ def measuring_program(known: Known, options: Options) -> Program:
         ],
     )
     body = Body(known, options, writer, trigger, times, space, unlike)
-    lines = ["%"] if options.dialect == "iso" else []
+    lines: list[str] = []
     for text in [*header(known, options, space, times, visits), *program.summary, *program.unapproached]:
         lines += writer.comment(text)
     lines += modes(writer, trigger, options, times.feed)
     for action in actions:
         lines += body.lines(action)
-    lines += [*writer.comment("end"), "M2"] if options.dialect == "linuxcnc" else [*writer.comment("end"), "M30", "%"]
-    lines = numbered(lines) if options.line_numbers else lines
+    lines = writer.whole(lines, line_numbers=options.line_numbers)
     return Program(
         "\n".join(lines) + "\n", *(getattr(program, name) for name in list(program.__dataclass_fields__)[1:])
     )

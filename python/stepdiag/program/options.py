@@ -21,11 +21,16 @@ COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")
 class Options:
     """Options of a program. Lengths in mm, in the controller's coordinates. None has a default."""
 
-    dialect: Dialect = option("linuxcnc", "LinuxCNC's G-code, or words of ISO 6983 that most controllers understand.")
+    dialect: Dialect = option(
+        "linuxcnc",
+        "LinuxCNC's G-code, words of ISO 6983 that most controllers understand, Siemens' G-code, or Heidenhain's "
+        "Klartext.",
+    )
     origin: Triple = option((0.0, 0.0, 0.0), "Coordinates of home, mm.", metavar="X Y Z")
     coordinates: str | None = option(
         None,
-        "Machine coordinates G53, or a work offset G54 to G59.  [default: G53 for linuxcnc, G54 for iso]",
+        "Machine coordinates G53, or a work offset G54 to G59 (siemens: to G57; heidenhain: G54, the active preset).  "
+        "[default: G53 for linuxcnc, else G54]",
         metavar="G5x",
     )
     limits: tuple[float, float, float, float, float, float] | None = option(
@@ -43,17 +48,17 @@ class Options:
     trigger: Trigger | None = option(
         None,
         "How the program requests a reading (docs/measuring.md); code: by --trigger-code.  "
-        "[default: handshake for linuxcnc, dwell for iso]",
+        "[default: handshake for linuxcnc, else dwell]",
     )
     trigger_code: str = option("", "Your own M-code that requests a reading.", metavar="M80")
     timeout: float = option(300.0, "Seconds that a handshake waits for a reading.", metavar="S")
-    dwell_word: DwellWord = option("P", "G4 takes seconds as P, X or F, or milliseconds as P (PMS).")
+    dwell_word: DwellWord = option("P", "G4 of iso takes seconds as P, X or F, or milliseconds as P (PMS).")
     decimals: int | None = option(
-        None, "Decimal places of positions in mm.  [default: 6 for linuxcnc, 4 for iso]", metavar="N"
+        None, "Decimal places of positions in mm.  [default: 6 for linuxcnc, else 4]", metavar="N"
     )
     align: bool = option(True, "Stop at the first point of a line to align the beam.")
     stops: bool = option(True, "Stop before each line to set up head and mirror; not where all heads stay installed.")
-    line_numbers: bool = option(False, "Number the blocks (iso).")
+    line_numbers: bool = option(False, "Number the blocks (heidenhain: always).")
 
 
 def writer_of(options: Options) -> Writer:
@@ -64,7 +69,12 @@ def writer_of(options: Options) -> Writer:
         raise InvalidArgument(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates}")
     if not 3 <= decimals <= 12:
         raise InvalidArgument(f"decimals: expected 3 to 12 of a millimetre, got {decimals}")
-    if options.dwell_word not in get_args(DwellWord) or (linuxcnc and options.dwell_word != "P"):
+    offsets = {"siemens": COORDINATES[:5], "heidenhain": COORDINATES[:2]}.get(options.dialect, COORDINATES)
+    if coordinates not in offsets:
+        raise InvalidArgument(
+            f"coordinates: expected {' to '.join(offsets[:: len(offsets) - 1])} in {options.dialect}, got {coordinates}"
+        )
+    if options.dwell_word not in get_args(DwellWord) or (options.dialect != "iso" and options.dwell_word != "P"):
         raise InvalidArgument("dwell word: expected P, or in the dialect iso X, F or PMS")
     return Writer(options.dialect, decimals, coordinates, options.dwell_word)
 
@@ -78,8 +88,8 @@ def trigger_of(options: Options) -> Trigger:
         raise InvalidArgument(f'trigger code: expected an M-code such as M80, got "{options.trigger_code}"')
     if not 0.0 < options.timeout < np.inf:
         raise InvalidArgument(f"timeout: expected a time above 0, got {options.timeout:g}")
-    if trigger in ("handshake", "pulse") and options.dialect == "iso":
-        raise InvalidArgument(f"trigger: {trigger} is LinuxCNC's; iso has dwell, or a trigger code")
+    if trigger in ("handshake", "pulse") and options.dialect != "linuxcnc":
+        raise InvalidArgument(f"trigger: {trigger} is LinuxCNC's; {options.dialect} has dwell, or a trigger code")
     return trigger
 
 

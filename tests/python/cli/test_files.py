@@ -1,6 +1,10 @@
 """The commands check and init: distinguishing files, and beginning with new ones."""
 
+import os
+import pty
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -154,6 +158,72 @@ def test_sheet_for_a_scenario_has_the_columns_of_its_head(here: Path) -> None:
     assert run("init", "-o", "sheets", "--sheet-for", "psd.toml") == 0
     assert [path.name for path in Path("sheets").iterdir()] == ["measurement.csv"]
     assert sd.read_measurement("sheets/measurement.csv").channels.keys() == {"distance", "spot_x", "spot_y"}
+
+
+def test_init_takes_what_everybody_states(here: Path) -> None:
+    words = ["--volume", "400", "300", "250", "--chain", "[w Y' X' b Z t]", "--layout", "psd", "--steps", "4"]
+    assert run("init", "-o", "machine", *words) == 0
+    known = sd.read_scenario("machine/scenario.toml").known
+    assert known.plan.volume.tolist() == [400.0, 300.0, 250.0]
+    assert (str(known.chain), known.plan.steps, known.head.layout) == ("[w Y' X' b Z t]", 4, "psd")
+    assert len(Path("machine/scenario.toml").read_text().splitlines()) <= 27
+    assert run("init", "-o", "all", *words, "--all-keys") == 0
+    every = sd.read_scenario("all/scenario.toml").known
+    assert (every.plan.steps, every.head.layout) == (4, "psd")
+    assert len(Path("all/scenario.toml").read_text().splitlines()) > 300
+
+
+@pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
+def test_new_scenario_of_every_layout_is_simulated_and_evaluated(here: Path, layout: str) -> None:
+    assert run("init", "-o", "machine", "--layout", layout, "--steps", "3") == 0
+    assert run("check", "machine/scenario.toml", "machine/measurement.csv") in (0, 2)  # the sheet has no readings
+    assert run("simulate", "machine/scenario.toml", "-o", "r.csv") == 0
+    assert run("evaluate", "machine/scenario.toml", "r.csv", "-o", "c.csv") == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (["--volume", "0", "300", "250"], "the new scenario: volume.x_mm: expected a length"),
+        (["--chain", "XYZ"], "the new scenario: machine.chain: chain \"XYZ\": has 3 links"),
+        (["--steps", "0"], "the new scenario: plan.steps: expected an integer"),
+        (["--layout", "psd", "--head", "three_beams"], "--layout: goes with a head that has no description"),
+        (["--steps", "3", "--sheet-for", "scenario.toml"], "--steps: goes with a new scenario"),
+    ],
+)
+def test_init_refuses(here: Path, capsys: pytest.CaptureFixture[str], words: list[str], error: str) -> None:
+    assert run("init", "-o", "machine", *words) == 2
+    assert error in capsys.readouterr().err
+    assert not Path("machine").exists()
+
+
+def test_init_asks_on_a_terminal(here: Path) -> None:
+    """A pseudo-terminal, at which a person answers; Enter takes what is offered."""
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "stepdiag", "init", "-o", "machine", "--steps", "3"]
+    with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs) as process:
+        os.write(ours, b"400\n\n250\n\npsd\n")
+        assert process.wait(60.0) == 0
+    known = sd.read_scenario("machine/scenario.toml").known
+    assert known.plan.volume.tolist() == [400.0, 1000.0, 250.0]
+    assert (known.plan.steps, known.head.layout) == (3, "psd")
+
+
+def test_empty_sheet_is_written_again_after_an_edit(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("init", "-o", "machine", "--steps", "3") == 0
+    edited = Path("machine/scenario.toml").read_text().replace("steps = 3", "steps = 4")
+    Path("machine/scenario.toml").write_text(edited)
+    capsys.readouterr()
+    assert run("init", "-o", "machine") == 2
+    assert "init --sheet-for machine/scenario.toml -o machine" in capsys.readouterr().err
+    assert run("init", "-o", "machine", "--sheet-for", "machine/scenario.toml") == 0
+    assert sd.read_measurement("machine/measurement.csv").point.max() == 12
+    sheet = Path("machine/measurement.csv").read_text().splitlines()
+    filled = [sheet[0], sheet[1].replace(",,,,", ",100.0,,,"), *sheet[2:]]
+    Path("machine/measurement.csv").write_text("\n".join(filled) + "\n")
+    assert run("init", "-o", "machine", "--sheet-for", "machine/scenario.toml") == 2
+    assert "it has readings" in capsys.readouterr().err
+    assert Path("machine/measurement.csv").read_text() == "\n".join(filled) + "\n"
 
 
 def test_init_never_overwrites(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

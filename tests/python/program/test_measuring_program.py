@@ -86,6 +86,66 @@ def test_an_iso_program_has_words_of_iso_6983_only_and_the_same_points(lines: st
     assert_is_the_plan(coded, again, scenario, origin, 0.51e-4)
 
 
+SIEMENS = re.compile(
+    r"; .*|MSG\(\"[^\"]*\"\)|MSG\(\)|M0|M5|M9|M30|M80|G54|F[\d.]+|G710 G90 G94 G17 G40 D0 G60 G601|G4 F[\d.]+"
+    r"|G[01](?: [XYZ]-?\d+\.\d+)+|"
+)
+KLARTEXT = re.compile(
+    r"; .*|STOP|M5|M9|M30|M80|CYCL DEF 9\.0 DWELL TIME|CYCL DEF 9\.1 DWELL [\d.]+|(?:BEGIN|END) PGM STEPDIAG MM"
+    r"|L(?: [XYZ][+-]\d+\.\d+)+ R0 (?:FMAX|F\d+\.\d+)(?: M91)?"
+)
+
+
+@pytest.mark.parametrize("code", ["", "M80"])
+@pytest.mark.parametrize("dialect", ["siemens", "heidenhain"])
+@CASES
+def test_other_dialects_read_the_same_points(lines: str, plan: str, dialect: str, code: str) -> None:
+    """Every block is of a form that the language has; a reading is a dwell after a move at feed, or the code."""
+    scenario, origin = scenario_of(lines, plan), (-10.0, 20.5, -500.0)
+    program = measuring_program(scenario, Options(dialect=dialect, origin=origin, trigger_code=code))  # type: ignore[arg-type]
+    form = SIEMENS if dialect == "siemens" else KLARTEXT
+    place, readings, stops = np.zeros(3), [], 0
+    blocks = program.text.splitlines()
+    assert "%" not in program.text
+    for number, block in enumerate(blocks):
+        if dialect == "heidenhain":
+            counted, _, block = block.partition(" ")
+            assert counted == str(number)
+        assert form.fullmatch(block), block
+        moves = re.findall(r"([XYZ])([+-]?\d+\.\d+)", block) if block[0:1] in ("G", "L") else []
+        for axis, value in moves:
+            place["XYZ".index(axis)] = float(value)
+        stops += block in ("M0", "STOP")
+        if (code and block == code) or (not code and block.startswith(("G4 F", "CYCL DEF 9.1 DWELL"))):
+            readings.append(place.copy())
+            if not code:
+                assert float(re.split(r"F|DWELL ", block)[-1]) == 0.75
+    expected = np.concatenate([visit.positions for visit in visits_of(scenario)]) + np.asarray(origin)
+    np.testing.assert_allclose(readings, expected, rtol=0.0, atol=0.51e-4)
+    assert stops == 2 * len({visit.set_up for visit in visits_of(scenario)})
+    last = "M30" if dialect == "siemens" else f"{len(blocks) - 1} END PGM STEPDIAG MM"
+    assert blocks[-1] == last
+
+
+def test_machine_coordinates_of_other_dialects() -> None:
+    scenario = scenario_of()
+    siemens = measuring_program(scenario, Options(dialect="siemens", coordinates="G53")).text
+    assert all(line.startswith("G53 ") for line in siemens.splitlines() if " X" in line and not line.startswith(";"))
+    klartext = measuring_program(scenario, Options(dialect="heidenhain", coordinates="G53")).text
+    assert all(line.endswith(" M91") for line in klartext.splitlines() if " L " in line)
+    for dialect, coordinates in (("siemens", "G58"), ("heidenhain", "G55")):
+        with pytest.raises(InvalidArgument, match=f"coordinates: expected .* in {dialect}, got {coordinates}"):
+            measuring_program(scenario, Options(dialect=dialect, coordinates=coordinates))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "siemens", "heidenhain"])
+def test_program_may_be_written_again(dialect: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(SCENARIO.format(lines=BODY, plan="", steps=2))
+    for _ in range(2):
+        assert main(["nc", "a.toml", "-o", "a.txt", "--dialect", dialect]) == 0
+
+
 @CASES
 def test_every_axis_comes_to_every_point_from_the_side_that_the_visit_says(lines: str, plan: str) -> None:
     scenario = scenario_of(lines, plan)
