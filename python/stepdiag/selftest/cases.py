@@ -6,7 +6,7 @@ import csv
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from importlib.resources import files
+from importlib.resources import files as resources
 from pathlib import Path
 from typing import Final
 
@@ -19,9 +19,10 @@ from stepdiag.head.description import find_shipped_head, parse_head_design
 from stepdiag.scenario.description import Scenario, adjust_scenario, evaluate_scenario, read_scenario
 from stepdiag.selftest.jcgm import UNIFORM, B, gauge_block, straight_line, sum_of_four
 from stepdiag.selftest.table import SelfTest, SelfTestRow, this_installation
+from stepdiag.selftest.ways import exports, files, units
 from stepdiag.uncertainty.monte_carlo import run_monte_carlo
 
-KNOWN: Final = Path(str(files("stepdiag.selftest") / "known"))
+KNOWN: Final = Path(str(resources("stepdiag.selftest") / "known"))
 
 NIST: Final = "NIST Engineering Metrology Toolbox, refractive index of air"
 SCHOTT: Final = "SCHOTT, data sheet of N-BK7"
@@ -240,6 +241,9 @@ CASES: Final[tuple[Callable[[Path], Iterator[SelfTestRow]], ...]] = (
     monte_carlo,
     compensator,
     refusals,
+    units,
+    files,
+    exports,
 )
 
 

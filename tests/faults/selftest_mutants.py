@@ -1,0 +1,160 @@
+"""What the self-test does not see: constants and signs on the ways in and out are changed, one at a time.
+
+    ./run python tests/faults/selftest_mutants.py [PROCESSES]
+
+A constant is multiplied by 1.01 (0 becomes 1), a sign is turned. A mutant is seen if `stepdiag selftest` fails, or does
+not run. What stays unseen is printed; docs/selftest.md lists it with the reason.
+"""
+
+import ast
+import multiprocessing
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+PACKAGE: Final = Path(__file__).parents[2] / "python" / "stepdiag"
+MODULES: Final = (
+    "units.py",
+    "importing/columns.py",
+    "importing/numbers.py",
+    "exporting/common.py",
+    "exporting/csv_grid.py",
+    "exporting/isg.py",
+    "exporting/linuxcnc_comp.py",
+    "exporting/linuxcnc_kins.py",
+    "exporting/polynomial.py",
+    "exporting/position_error.py",
+    "positions/readings.py",
+)
+WAYS: Final = """
+from stepdiag.selftest.cases import KNOWN
+from stepdiag.selftest.ways import exports, files, units
+rows = [row for case in (units, files, exports) for row in case(KNOWN)]
+raise SystemExit(0 if all(row.passed for row in rows) else 3)
+"""
+LONGEST: Final = 60.0  # s of a mutant
+SEEN: Final = 0.95
+
+
+class Turn(ast.NodeTransformer):
+    """Changes the place of this number; without one it counts them. `what`: the change in words."""
+
+    def __init__(self, wanted: int | None = None) -> None:
+        self.wanted, self.places, self.what = wanted, 0, ""
+
+    def _is_next(self, node: ast.expr, what: str) -> bool:
+        self.places += 1
+        if self.places - 1 != self.wanted:
+            return False
+        self.what = f"line {node.lineno}: {what}"
+        return True
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        value = node.value
+        if isinstance(value, float):
+            changed = value * 1.01 if value else 1.0
+            return (
+                ast.copy_location(ast.Constant(changed), node) if self._is_next(node, f"{value} is {changed}") else node
+            )
+        return node
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Decimal("25.4"), and what a table of units gives to it."""
+        self.generic_visit(node)
+        return node
+
+    def visit_Dict(self, node: ast.Dict) -> ast.AST:
+        self.generic_visit(node)
+        for k, value in enumerate(node.values):
+            if isinstance(value, ast.Constant) and isinstance(value.value, str) and _is_number(value.value):
+                changed = repr(float(value.value) * 1.01)
+                if self._is_next(value, f"{value.value} is {changed}"):
+                    node.values[k] = ast.copy_location(ast.Constant(changed), value)
+        return node
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.op, ast.USub) and self._is_next(node, "without its minus"):
+            return node.operand
+        return node
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if (
+            isinstance(node.op, ast.Add | ast.Sub)
+            and not _is_text(node)
+            and self._is_next(node, f"{ast.unparse(node)}: the other sign")
+        ):
+            node.op = ast.Sub() if isinstance(node.op, ast.Add) else ast.Add()
+        return node
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_text(node: ast.BinOp) -> bool:
+    """Sums of texts and lists have no sign."""
+    sides = (node.left, node.right)
+    return any(isinstance(one, ast.JoinedStr | ast.List | ast.Tuple) for one in sides) or any(
+        isinstance(one, ast.Constant) and isinstance(one.value, str) for one in sides
+    )
+
+
+def mutants() -> Iterator[tuple[str, int]]:
+    for module in MODULES:
+        counted = Turn()
+        counted.visit(ast.parse((PACKAGE / module).read_text(encoding="utf-8")))
+        yield from ((module, number) for number in range(counted.places))
+
+
+def tried(mutant: tuple[str, int]) -> tuple[str, str, bool]:
+    """Module, change, and whether the self-test sees it."""
+    module, number = mutant
+    turned = Turn(number)
+    source = ast.unparse(turned.visit(ast.parse((PACKAGE / module).read_text(encoding="utf-8"))))
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(
+            PACKAGE, Path(folder) / "stepdiag", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
+        )
+        changed = Path(folder) / "stepdiag" / module
+        changed.unlink()
+        changed.write_text(source, encoding="utf-8")
+        environment = os.environ | {"PYTHONPATH": folder, "PYTHONDONTWRITEBYTECODE": "1", "OPENBLAS_NUM_THREADS": "1"}
+        try:
+            status = subprocess.run(
+                [sys.executable, "-c", WAYS], env=environment, capture_output=True, timeout=LONGEST, check=False
+            ).returncode
+        except subprocess.TimeoutExpired:
+            status = 1
+    return module, turned.what, status != 0
+
+
+def main() -> None:
+    processes = int(sys.argv[1]) if len(sys.argv) > 1 else os.cpu_count() or 1
+    subprocess.run([sys.executable, "-c", WAYS], check=True)  # the package itself passes
+    with multiprocessing.Pool(processes) as pool:
+        results = pool.map(tried, list(mutants()), chunksize=1)
+    unseen = [(module, what) for module, what, seen in results if not seen]
+    for module in MODULES:
+        own = [seen for name, _, seen in results if name == module]
+        print(f"{module}: {sum(own)} of {len(own)} seen")
+    for module, what in unseen:
+        print(f"unseen: {module}, {what}")
+    share = 1.0 - len(unseen) / len(results)
+    print(f"{len(results) - len(unseen)} of {len(results)} mutants seen, {100.0 * share:.1f} %")
+    if share < SEEN:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
