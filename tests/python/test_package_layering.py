@@ -43,7 +43,7 @@ BELOW: dict[str, set[str]] = {
     "twin": {"acquisition"},
     "linuxcnc": set(),
     "figures": {"planning"},
-    "selftest": {"uncertainty"},
+    "selftest": {"uncertainty", "importing", "exporting"},
     "presentation": {"figures", "acquisition", "positions", "evaluation", "exporting", "selftest"},
     "book": {"presentation"},
     "platform": set(),

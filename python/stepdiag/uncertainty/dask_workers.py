@@ -36,7 +36,7 @@ from stepdiag.wrong_arguments import checked
 
 TASKS_A_THREAD: Final = 2  # submitted at a time: one computed, one waiting
 CONNECT_SECONDS: Final = 10.0
-START_SECONDS: Final = 120.0
+START_SECONDS: Final = 60.0  # of each try
 PARK_SECONDS: Final = 0.2
 LOOPBACK: Final = "127.0.0.1"
 PRELOAD: Final = ["stepdiag.uncertainty.dask_preload"]
@@ -215,17 +215,16 @@ def workers_of(
 
 
 def _arrive(client: Any, cluster: Any, count: int) -> bool:
-    """Whether all workers have started. Rarely the process of one dies at its start, where this process has had workers
-    before (Python 3.13); Dask waits for it in vain."""
+    """Whether all workers have started. Rarely the process of one dies or hangs at its start, where this process has had
+    workers before (Python 3.13); Dask waits for it in vain."""
     deadline = time.monotonic() + START_SECONDS
     while True:
         try:
             client.wait_for_workers(count, timeout=1.0)  # they start at different times
         except TimeoutError:
-            if any(worker.status.name == "closed" for worker in cluster.workers.values()):
+            is_dead = any(worker.status.name == "closed" for worker in cluster.workers.values())
+            if is_dead or time.monotonic() > deadline:
                 return False
-            if time.monotonic() > deadline:
-                raise
         else:
             return True
 

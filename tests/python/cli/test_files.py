@@ -185,7 +185,7 @@ def test_new_scenario_of_every_layout_is_simulated_and_evaluated(here: Path, lay
     ("words", "error"),
     [
         (["--volume", "0", "300", "250"], "the new scenario: volume.x_mm: expected a length"),
-        (["--chain", "XYZ"], "the new scenario: machine.chain: chain \"XYZ\": has 3 links"),
+        (["--chain", "XYZ"], 'the new scenario: machine.chain: chain "XYZ": has 3 links'),
         (["--steps", "0"], "the new scenario: plan.steps: expected an integer"),
         (["--layout", "psd", "--head", "three_beams"], "--layout: goes with a head that has no description"),
         (["--steps", "3", "--sheet-for", "scenario.toml"], "--steps: goes with a new scenario"),

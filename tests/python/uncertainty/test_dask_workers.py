@@ -152,3 +152,13 @@ def test_a_worker_that_died_at_its_start_is_not_waited_for(status: str, *, arriv
     workers = {0: SimpleNamespace(status=SimpleNamespace(name="running"))}
     workers[1] = SimpleNamespace(status=SimpleNamespace(name=status))
     assert dask_workers._arrive(Client(), SimpleNamespace(workers=workers), 2) is arrived
+
+
+def test_a_worker_that_hangs_at_its_start_is_not_waited_for_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Client:
+        def wait_for_workers(self, count: int, timeout: float) -> None:
+            raise TimeoutError(count, timeout)
+
+    monkeypatch.setattr("stepdiag.uncertainty.dask_workers.START_SECONDS", 0.0)
+    workers = {0: SimpleNamespace(status=SimpleNamespace(name="running"))}
+    assert not dask_workers._arrive(Client(), SimpleNamespace(workers=workers), 2)
