@@ -59,7 +59,9 @@ def test_report_page_has_what_evaluate_prints(tmp_path: Path) -> None:
     sd.simulate(sd.read_scenario(EXAMPLES / "scenario.toml")).write(run)
     said = output_of("-m", "stepdiag", "evaluate", EXAMPLES / "scenario.toml", run, "-o", out)
     page = (EXAMPLES.parent / "docs" / "report.md").read_text(encoding="utf-8")
-    assert "".join(f"    {line}\n" for line in said.splitlines()) in page
+    *report, last = said.splitlines()
+    assert "".join(f"    {line}\n" for line in report) in page
+    assert last == f"wrote {out}"
 
 
 def test_better_plan_is_as_much_better_as_the_page_on_plans_says(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Grouped, Writes, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Grouped, Writes, tell, watched
 from stepdiag.interruption import at_end
 from stepdiag.io.outputs import OutputFile
 
@@ -231,7 +231,9 @@ class _Use:
             if given is not None and given.path.name != str(given.path):
                 raise InvalidArgument(f"{given.path}: expected a name without folders, for {self.machine.name}")
             if given is not None and any(params.get(name) for name in _GO_ON):
-                params[name] = OutputFile(self.machine.folder / kept.folder / given.path.name, given.kinds)
+                params[name] = watched(
+                    self.ctx, OutputFile(self.machine.folder / kept.folder / given.path.name, given.kinds)
+                )
                 self.outputs.append(params[name].path)
                 continue
             as_folder = ending == "/"
@@ -240,7 +242,7 @@ class _Use:
             self.outputs.append(path)
             kinds = next(one.type for one in self.command.params if one.name == name)
             assert isinstance(kinds, Writes)
-            params[name] = OutputFile(path, kinds.kinds)
+            params[name] = watched(self.ctx, OutputFile(path, kinds.kinds))
         if "overwrite" in params:
             params["overwrite"] = False
         if self.outputs:

@@ -47,6 +47,12 @@ def _state(path: Path) -> tuple[int, int] | None:
     return found.st_ino, found.st_mtime_ns
 
 
+def watched(context: click.Context, output: OutputFile) -> OutputFile:
+    """The same; if it is written, say_outputs says so."""
+    context.meta.setdefault(_OUTPUTS, {})[output.path] = _Output(_state(output.path), context.params)
+    return output
+
+
 def say_of_output(path: Path, what: str) -> None:
     """What is said of a file beside its name, when the command is done."""
     click.get_current_context().meta[_OUTPUTS][path].what = what
@@ -70,9 +76,7 @@ class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> OutputFile:
         output = value if isinstance(value, OutputFile) else OutputFile(Path(value), self.kinds)
-        if ctx is not None:
-            ctx.meta.setdefault(_OUTPUTS, {})[output.path] = _Output(_state(output.path), ctx.params)
-        return output
+        return output if ctx is None else watched(ctx, output)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         return [CompletionItem(incomplete, type="file")]

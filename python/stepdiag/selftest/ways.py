@@ -359,7 +359,7 @@ def _machine(
 ) -> _core.Calibration:
     """Of a gantry, whose X carries Y, and Y carries Z and the tool.
 
-    reversal: that of a function, + less -, µm, everywhere. parabola: of EXX, 1/mm: over the square of X, beside SLOPE."""
+    reversal: that of a function, + less -, µm. parabola: of EXX over the square of X, 1/mm, beside SLOPE."""
     functions = {}
     for name in FUNCTIONS:
         factor = 1e-3 if name[1] in "XYZ" else 1e-6

@@ -215,8 +215,8 @@ def workers_of(
 
 
 def _arrive(client: Any, cluster: Any, count: int) -> bool:
-    """Whether all workers have started. Rarely the process of one dies or hangs at its start, where this process has had
-    workers before (Python 3.13); Dask waits for it in vain."""
+    """Whether all workers have started. Rarely the process of one dies or hangs at its start, where this process has
+    had workers before (Python 3.13); Dask waits for it in vain."""
     deadline = time.monotonic() + START_SECONDS
     while True:
         try:
