@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 from typing import Final, Literal
 
@@ -19,6 +20,7 @@ from stepdiag.io.data_files import write_measurement
 from stepdiag.units import native
 
 PICOMETRE: Final = Decimal("1e-9")  # mm
+CLOCK_ERROR: Final = 2.0  # s; clocks are set by less all the time
 TEMPERATURE_AGE: Final = 600.0  # s for which a temperature holds, unless told otherwise
 
 Zero = Literal["none", "first"]
@@ -45,7 +47,9 @@ def measurement_of(
     uncertainties: bool = False,
     temperature_age: float = TEMPERATURE_AGE,
 ) -> Measurement:
-    """The readings in the plan's order. A lost reading is NaN; a point not yet read has no row.
+    """The readings in the plan's order.
+
+    A lost reading is NaN; a point not yet read has no row. There are no times where the clock was set back.
 
     Args:
         zero: "first": subtract a constant for each set-up and beam, such that its first reading is
@@ -74,6 +78,7 @@ def measurement_of(
                 deviations[column.channel][row] = float(column.native(deviation / math.sqrt(reading.values)))
     times = [reading.time for _, _, reading in rows]
     start = min(times)
+    seconds = {"time": np.array([(time - start).total_seconds() for time in times])}
     recorded = [record for record in content.records if isinstance(record, TemperatureRow)]
     with located(str(content.path)):
         return Measurement(
@@ -82,13 +87,29 @@ def measurement_of(
             np.array([visit.position_mm[index] for visit, index, _ in rows]),
             {
                 **values,
-                "time": np.array([(time - start).total_seconds() for time in times]),
+                **({} if set_back(content) else seconds),
                 **_recorded(recorded, times, temperature_age),
             },
             run=[visit.run for visit, _, _ in rows],
             direction=[visit.direction for visit, _, _ in rows],
             standard_uncertainty=deviations if uncertainties else {},
         )
+
+
+def set_back(content: RawContent) -> str:
+    """That the clock was set back between two readings, in words; else empty. One that was set forward looks like a
+    pause."""
+    readings = [record for record in content.records if isinstance(record, RawReading)]
+    return next(filter(None, (clock_remark(before, after) for before, after in pairwise(readings))), "")
+
+
+def clock_remark(before: RawReading, after: RawReading) -> str:
+    """The same of two readings that follow each other."""
+    seconds = (before.time - after.time).total_seconds()
+    if seconds <= CLOCK_ERROR:
+        return ""
+    where = f"line {after.line}, point {after.point}"
+    return f"the clock was set back by {seconds:.0f} s before {where}: the run has no times (time_s)"
 
 
 def _rows(content: RawContent, readings: dict[tuple[int, int], RawReading]) -> list[Row]:

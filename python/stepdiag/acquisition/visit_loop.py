@@ -14,6 +14,7 @@ from stepdiag.acquisition.placement import placement
 from stepdiag.acquisition.point_check import PointCheck
 from stepdiag.acquisition.raw_file import RawContent, RawFile
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Remark, Session, TemperatureRow, Value
+from stepdiag.acquisition.run_from_raw import clock_remark
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Context, Missed, Trigger, point_text
@@ -228,6 +229,9 @@ class Acquisition:
             self._temperatures.warn_of_age(stored.time)
         self._tell_lost(visit, index, stored)
         key = (stored.visit, stored.point)
+        before = next(reversed(self.done.values()), None)
+        if before is not None and (remark := clock_remark(before, stored)):
+            self._operator.tell(f"warning: {remark}")
         if once_more and stored.is_lost and not self.done[key].is_lost:
             self._file.append(values)  # the earlier reading is better
         else:

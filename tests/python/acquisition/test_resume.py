@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.acquire import raw_path
 from stepdiag.acquisition.raw_file import RawFile, read_raw
-from stepdiag.acquisition.run_from_raw import measurement_of
+from stepdiag.acquisition.run_from_raw import measurement_of, set_back
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import Stopped
 from stepdiag.io.data_files import read_measurement
@@ -382,3 +384,25 @@ def test_raw_file_of_version_1_is_read_and_continued(tmp_path: Path) -> None:
     assert read_raw(raw).readings().items() >= earlier.readings().items()
     expected = np.round(simulate_scenario(described).channels["d1"] * 1e9) / 1e9
     assert np.array_equal(read_measurement(output).channels["d1"], expected)
+
+
+# --- the clock -------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("seconds", "is_told"), [(-3600, True), (-1, False), (3600, False)])
+def test_clock_that_is_set_during_a_run(whole: Path, seconds: int, *, is_told: bool) -> None:
+    """Set back, it is known, and the run has no times; set forward it looks like a pause."""
+    raw = raw_path(whole)
+    changed, count = [], 0
+    for line in raw.read_text().splitlines():
+        record = json.loads(line)
+        count += record.get("record") == "reading"
+        if count > 10 and "time" in record:
+            record["time"] = (datetime.fromisoformat(record["time"]) + timedelta(seconds=seconds)).isoformat()
+        changed.append(json.dumps(record))
+    raw.write_text("\n".join(changed) + "\n")
+    content = read_raw(raw)
+    found = measurement_of(content)
+    assert ("time" in found.channels) != is_told
+    assert set_back(content) == (
+        "the clock was set back by 3600 s before line ppp, point 3: the run has no times (time_s)" if is_told else ""
+    )
+    np.testing.assert_array_equal(found.channels["d1"], read_measurement(whole).channels["d1"])

@@ -133,14 +133,14 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
 def _convert(raw: Path, output: OutputFile, options: AcquireOptions) -> None:
     from stepdiag.acquisition.acquire import raw_path
     from stepdiag.acquisition.raw_file import read_raw
-    from stepdiag.acquisition.run_from_raw import write_run
+    from stepdiag.acquisition.run_from_raw import set_back, write_run
 
     path = output.claim(raw, overwrite=True)
     if path.exists() and raw_path(path).resolve() != raw.resolve():
         raise InvalidArgument(f"{path}: exists, and is not beside {raw}: move it away, or name another -o")
     content = read_raw(raw)
-    if content.torn is not None:
-        tell("warning", content.torn)
+    for warning in filter(None, (content.torn, set_back(content))):
+        tell("warning", warning)
     write_run(
         raw,
         path,
