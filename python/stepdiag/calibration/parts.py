@@ -1,8 +1,10 @@
-"""A calibration taken apart, to make another one of it."""
+"""The parts of a calibration: all, to make another one of it, and those that it lacks."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 from stepdiag._core import Calibration
+from stepdiag.parameters import AXES
 
 
 def parts_of(calibration: Calibration) -> dict[str, Any]:
@@ -39,3 +41,17 @@ def parts_of(calibration: Calibration) -> dict[str, Any]:
         "unverified": calibration.unverified,
         "provenance": calibration.provenance,
     }
+
+
+# Of a squareness, the axis beside that of its name.
+OTHER_AXIS: Final[Mapping[str, str]] = {"C0Y": "X", "B0Z": "X", "A0Z": "Y"}
+
+
+def unmeasured_axes(calibration: Calibration) -> list[str]:
+    """Axes of which a calibration has no function and no squareness."""
+    return [
+        axis
+        for axis in AXES
+        if not any(f"E{component}{axis}" in calibration.functions for component in "XYZABC")
+        and not any(axis in (name[2], OTHER_AXIS[name]) for name in calibration.squareness)
+    ]

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument, Machine
+from stepdiag.calibration.parts import OTHER_AXIS, unmeasured_axes
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
@@ -113,6 +114,7 @@ class VolumeErrors(Displayed):
     other_approaches: Mapping[str, float]  # "-++" ...: largest error of X, Y, Z so approached, mm; empty: not known
     ranking: tuple[VolumeContribution, ...]  # parameters, then axes; the smallest largest error first
     fit: str | None  # verdict of the calibration's fit
+    plane: "PlaneErrors | None" = None  # where nothing was measured of one axis
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -231,6 +233,7 @@ def volume(
         other_approaches=_other_approaches(source, machine, positions) if known else {},
         ranking=_ranking(source, machine, positions) if known and ranking else (),
         fit=source.fit if isinstance(source, Calibration) else None,
+        plane=None if known else _plane(source, machine, offset, positions),
     )
     return judged(not_judged, limit=limit)
 
@@ -263,6 +266,55 @@ def judged(found: VolumeErrors, *, limit: float | None) -> VolumeErrors:
         limit=limit,
         verdict=verdict,
         no_verdict_because=why,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneErrors:
+    """Errors along two axes, in their plane, where nothing was measured of the third one, which stands at home."""
+
+    axes: str  # "XY"
+    unmeasured: str  # "Z"
+    largest: float  # mm, length of the components along the two axes
+    largest_at: FloatArray  # (3,) commanded, mm
+    largest_components: FloatArray  # (2,) mm
+    largest_uncertainty: float | None  # standard uncertainty along its direction, mm; None without a covariance
+    rms: float  # root of the mean of its square over the nodes, mm
+
+
+def _plane(
+    source: Calibration | Machine, machine: Machine, tool: FloatArray, grid: Sequence[FloatArray]
+) -> PlaneErrors | None:
+    """None unless nothing was measured of just one axis, and the errors along the others are known in their plane."""
+    unmeasured = unmeasured_axes(source) if isinstance(source, Calibration) else []
+    if len(unmeasured) != 1 or not isinstance(source, Calibration):
+        return None
+    (axis,) = unmeasured
+    along = [n for n, one in enumerate(AXES) if one != axis]
+    of_axis = {
+        *(name for name in FUNCTIONS if name[2] == axis),
+        *(n for n in SQUARENESSES if axis in (n[2], OTHER_AXIS[n])),
+    }
+    if any(set(_missing(source, tool).get(AXES[n], ())) - of_axis for n in along):
+        return None
+    places = [np.zeros(1) if one == axis else positions for one, positions in zip(AXES, grid, strict=True)]
+    points = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, 3)
+    errors = _core.errors_at(machine, points)[:, along]
+    lengths = np.linalg.norm(errors, axis=1)
+    worst = int(np.argmax(lengths))
+    u = None
+    if source.covariance is not None:
+        both = _core.error_uncertainties_at(source, points[worst : worst + 1], tool=tool)[0, along]
+        # Along the direction, as if the two components were correlated altogether: at most that much.
+        u = float(np.sum(both * np.abs(errors[worst])) / lengths[worst]) if lengths[worst] > 0.0 else float(both.max())
+    return PlaneErrors(
+        axes="".join(AXES[n] for n in along),
+        unmeasured=axis,
+        largest=float(lengths[worst]),
+        largest_at=points[worst],
+        largest_components=errors[worst],
+        largest_uncertainty=u,
+        rms=float(np.sqrt(np.mean(lengths**2))),
     )
 
 

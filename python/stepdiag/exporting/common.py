@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
+from stepdiag.calibration.parts import OTHER_AXIS, unmeasured_axes
 from stepdiag.exporting.options import Approach, ExportOptions
 from stepdiag.findings.temperature import temperature_text
 from stepdiag.parameters import AXES
@@ -24,11 +25,11 @@ def require(calibration: Calibration, names: Sequence[str], options: ExportOptio
     What an axis brings that was not measured at all, as the third one of a machine of two, is exported as 0. Raises
     InvalidArgument if another one is undetermined, unless `options.incomplete`."""
     missing = list(undetermined_of(calibration, names))
-    unmeasured = [axis for axis in AXES if _is_unmeasured(calibration, axis)]
+    unmeasured = unmeasured_axes(calibration)
     said = []
     if len(unmeasured) == 1:
         (axis,) = unmeasured
-        missing = [name for name in missing if axis not in (name[2], _OTHER_AXIS.get(name))]
+        missing = [name for name in missing if axis not in (name[2], OTHER_AXIS.get(name))]
         said.append(f"note: {axis} was not measured: it is taken to be without errors and is not compensated")
     if missing and not options.incomplete:
         raise InvalidArgument(
@@ -38,14 +39,6 @@ def require(calibration: Calibration, names: Sequence[str], options: ExportOptio
     if held := list(_held(calibration, names)):
         said.append(f"note: outside their nodes tables hold their end values: {', '.join(held)}")
     return said
-
-
-_OTHER_AXIS: Final = {"C0Y": "X", "B0Z": "X", "A0Z": "Y"}  # of a squareness, beside that of its name
-
-
-def _is_unmeasured(calibration: Calibration, axis: str) -> bool:
-    functions = any(f"E{component}{axis}" in calibration.functions for component in "XYZABC")
-    return not functions and not any(axis in (name[2], _OTHER_AXIS[name]) for name in calibration.squareness)
 
 
 def _held(calibration: Calibration, names: Sequence[str]) -> Iterator[str]:

@@ -8,7 +8,14 @@ import numpy as np
 
 from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.volume import MOST_NODES, Interval, VolumeContribution, VolumeErrors, VolumeFigure
+from stepdiag.calibration.volume import (
+    MOST_NODES,
+    Interval,
+    PlaneErrors,
+    VolumeContribution,
+    VolumeErrors,
+    VolumeFigure,
+)
 from stepdiag.findings.meaning import fit_word, headline, is_valid
 from stepdiag.findings.temperature import temperature_text
 from stepdiag.presentation.blocks import Block, NoteBlock, RowBlock, TableBlock, VerdictBlock
@@ -27,6 +34,8 @@ def volume_blocks(found: VolumeErrors) -> Iterator[Block]:
         yield RowBlock("largest error", f"{length_text(found.largest, found.largest_interval)}")
         yield NoteBlock(f"at {place_of_largest(found)}: {parts} µm", indented=True)
         yield RowBlock("rms error", length_text(found.rms, found.rms_interval))
+    if found.plane is not None:
+        yield from _plane(found.plane)
     yield figure_table(found)
     yield from _ranking(found.ranking)
     yield from frame_notes(found)
@@ -47,6 +56,21 @@ def verdicts(found: VolumeErrors) -> Iterator[Block]:
             yield NoteBlock(found.interval_note, indented=True)
     if not is_warning:
         yield _of_calibration(found)
+
+
+def _plane(plane: PlaneErrors) -> Iterator[Block]:
+    """Of a machine of two axes."""
+    yield RowBlock("plane", f"{' and '.join(plane.axes)}; {plane.unmeasured} was not measured, and stands at home")
+    u = (
+        ""
+        if plane.largest_uncertainty is None
+        else f", standard uncertainty at most {_um(plane.largest_uncertainty)} µm"
+    )
+    yield RowBlock("largest error in the plane", f"{_um(plane.largest)} µm{u}")
+    at = ", ".join(f"{axis} {p:g}" for axis, p in zip("XYZ", plane.largest_at, strict=True) if axis in plane.axes)
+    parts = ", ".join(f"{axis} {_um(e)}" for axis, e in zip(plane.axes, plane.largest_components, strict=True))
+    yield NoteBlock(f"at {at} mm: {parts} µm", indented=True)
+    yield RowBlock("rms error in the plane", f"{_um(plane.rms)} µm")
 
 
 def _of_calibration(found: VolumeErrors) -> VerdictBlock:

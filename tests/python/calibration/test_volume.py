@@ -1,5 +1,6 @@
 """The error of the tool in the volume, against a brute-force evaluation of the exact pose."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,25 @@ from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.presentation.blocks import text_of
 from stepdiag.presentation.volume import volume_blocks
 
+TWO_AXES = """
+[volume]
+x_mm = 400.0
+y_mm = 300.0
+z_mm = 250.0
+[machine]
+chain = "[w X' b Y Z t]"
+[machine.random]
+seed = 3
+[plan]
+lines = ["pp0", "np0"]
+steps = 10
+scale_lines = ["p00", "0p0"]
+[head]
+layout = "ideal"
+[noise]
+distance_um = 0.1
+tilt_urad = 1.0
+"""
 # Both evaluate one pose; what is left is rounding of positions of up to 1 m.
 EXACT = 1e-9
 
@@ -438,3 +458,31 @@ def test_box_inside_has_no_larger_error_than_the_volume(certain: sd.Calibration)
     whole_volume = sd.volume(certain, ranking=False)
     assert inside.largest < whole_volume.largest
     assert inside.largest_interval is not None
+
+
+# --- machines of two axes --------------------------------------------------------------------------------------------
+def test_plane_of_two_axes_where_the_third_was_not_measured(tmp_path: Path) -> None:
+    """Its figures are those of the machine that was simulated, along X and Y with Z at home."""
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_AXES)
+    scenario = sd.read_scenario(path)
+    calibration = sd.evaluate(scenario, sd.simulate(scenario), full_covariance=True)
+    found = sd.volume(calibration, samples=1000)
+    assert math.isnan(found.largest)
+    plane = found.plane
+    assert plane is not None
+    assert (plane.axes, plane.unmeasured) == ("XY", "Z")
+    nodes = [np.linspace(0.0, edge, 11) for edge in (400.0, 300.0)]
+    points = np.array([[x, y, 0.0] for x in nodes[0] for y in nodes[1]])
+    truth = scenario.machine().error(points)[:, :2]
+    lengths = np.linalg.norm(truth, axis=1)
+    assert plane.largest_uncertainty is not None
+    assert abs(plane.largest - lengths.max()) < 3.0 * plane.largest_uncertainty
+    assert abs(plane.rms - np.sqrt(np.mean(lengths**2))) < 3.0 * plane.largest_uncertainty
+    text = "\n".join(text_of(volume_blocks(found)))
+    assert "plane: X and Y; Z was not measured, and stands at home" in text
+    assert "largest error in the plane" in text
+
+
+def test_volume_of_three_axes_has_no_plane() -> None:
+    assert sd.volume(calibrate(1), samples=1000, ranking=False).plane is None
