@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Final
 
 from stepdiag._core import InvalidArgument
-from stepdiag.importing.columns import SheetUnit, plain, split_head, unit_in
+from stepdiag.importing.columns import Column, SheetUnit, plain, split_head, unit_in
 from stepdiag.importing.numbers import decimal_mark, is_lost, native, number
-from stepdiag.importing.sheet import Cell, Rows, pages_of
+from stepdiag.importing.run import as_shown
+from stepdiag.importing.sheet import Cell, Formatted, Rows, pages_of
 from stepdiag.positions.readings import PositionReadings, PositionRow, readings_of
 
 _TARGETS: Final = ("target", "target_position", "targets", "position", "nominal", "soll", "sollposition", "ziel")
@@ -41,7 +42,7 @@ class _Series:
 def is_position_table(path: Path) -> bool:
     """Whether a file is a workbook, or a text with a head of targets and one of a run."""
     try:
-        return any(_find(rows) is not None for _, rows in pages_of(path))
+        return any(_find(rows) is not None for _, rows, _ in pages_of(path))
     except InvalidArgument:
         return False
 
@@ -49,13 +50,15 @@ def is_position_table(path: Path) -> bool:
 def read_position_table(path: Path) -> tuple[PositionReadings, list[str]]:
     """The readings, and what the file was taken for.
 
-    Raises InvalidArgument naming file and place: a column without direction or unit, or numbers that can be read in two
-    ways."""
-    tables = [(form, rows, at) for form, rows in pages_of(path) if (at := _find(rows)) is not None]
+    Raises InvalidArgument naming file and place: a column without direction or unit, hidden rows and columns, or
+    numbers that can be read in two ways."""
+    tables = [(form, rows, at, unseen) for form, rows, unseen in pages_of(path) if (at := _find(rows)) is not None]
     if len(tables) != 1:
-        ways = " and with ".join(form for form, _, _ in tables) or "none"
+        ways = " and with ".join(form for form, *_ in tables) or "none"
         raise InvalidArgument(f"{path}: expected a table with targets in rows and runs in columns, got {ways}")
-    form, rows, at = tables[0]
+    form, rows, at, unseen = tables[0]
+    if unseen:
+        raise InvalidArgument(f"{path}: {unseen[0]}: show it or delete it, so that it is clear whether it counts")
     heads, body = _heads(rows, at)
     where = f"{path}, {rows[at][0]}"
     target, unit = next((k, found) for k, head in enumerate(heads) if (found := _target_unit(head, where)) is not None)
@@ -70,24 +73,25 @@ def read_position_table(path: Path) -> tuple[PositionReadings, list[str]]:
     ]
     mark = decimal_mark(fields) if fields else "point"
 
-    def value(cell: Cell, of: SheetUnit) -> float | None:
+    def value(cell: Cell, of: SheetUnit, head: str, place: str) -> float | None:
         if isinstance(cell, str) and is_lost(cell):
             return None
         exact = number(cell, mark) if isinstance(cell, str) else Decimal(repr(cell))
+        if exact is not None and isinstance(cell, Formatted):
+            exact = as_shown(exact, cell.code, Column(0, head, "distance", of), f"{path}, {place}")
         return None if exact is None else native(exact, of)
 
     read: list[PositionRow] = []
     for place, cells in body:
         cells = [*cells, *[""] * (len(heads) - len(cells))]
-        at_target = value(cells[target], unit)
+        at_target = value(cells[target], unit, heads[target], place)
+        deviations = [value(cells[one.index], one.unit, one.head, place) for one in series]
         if at_target is None:
-            if any(value(cells[one.index], one.unit) is not None for one in series):
+            if any(deviation is not None for deviation in deviations):
                 raise InvalidArgument(f"{path}, {place}: {heads[target]}: expected a target, got {cells[target]!r}")
             continue
-        for one in series:
-            read.append(
-                (f"{path}, {place}: {one.head}", at_target, one.direction, one.cycle, value(cells[one.index], one.unit))
-            )
+        for one, deviation in zip(series, deviations, strict=True):
+            read.append((f"{path}, {place}: {one.head}", at_target, one.direction, one.cycle, deviation))
     read, are = _deviations(read, str(path))
     said = [f"{path}: {form}, decimal {mark}; {heads[target]}: target in {unit.name}"]
     said += [f"  {one.head}: {are} of cycle {one.cycle}, direction {one.direction}, {one.unit.name}" for one in series]

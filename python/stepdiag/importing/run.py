@@ -136,6 +136,8 @@ def _add(rows: _Rows, sheet: Sheet, said: _Said) -> list[str]:
             f"{path}: the commanded positions {missing} are missing: `column` names their columns, "
             "or `scenario` has the plan that gives all three"
         )
+    if not given and any(said.origin):
+        raise InvalidArgument(f"{path}: has no positions, which come from the plan: `origin` goes with a sheet's own")
     if not sheet.rows:
         raise InvalidArgument(f"{path}: has heads but no rows")
     mark = _mark(sheet, taken, said.decimal)
@@ -302,7 +304,7 @@ def _value(cell: Cell, column: Column, mark: str, where: str) -> float:
     if value is None or not value.is_finite():
         raise InvalidArgument(f"{where}: {column.head}: expected a number, got {cell!r}")
     if isinstance(cell, Formatted):
-        value = _as_shown(value, cell.code, column, where)
+        value = as_shown(value, cell.code, column, where)
     result = native(value, column.unit, column.sign)
     if column.name.startswith("u_") and not 1e-12 <= result <= 1e6:
         raise InvalidArgument(f"{where}: {column.head}: expected a standard uncertainty above 0, got {cell!r}")
@@ -320,7 +322,7 @@ def _without_unit(text: str, column: Column, where: str) -> str:
     return found[1]
 
 
-def _as_shown(value: Decimal, code: str, column: Column, where: str) -> Decimal:
+def as_shown(value: Decimal, code: str, column: Column, where: str) -> Decimal:
     """The value as people see it in the workbook, in the column's unit. Raises InvalidArgument where that is something
     else than the head says."""
     assert column.unit is not None

@@ -93,9 +93,23 @@ def read_sheet(
     return sheets[0]
 
 
-def pages_of(path: Path) -> list[tuple[str, Rows]]:
-    """The form and the rows of each sheet, or of each way to separate fields. Raises InvalidArgument."""
-    return [(page.form, page.rows) for page in _found(path, None, None) if not page.is_hidden]
+def pages_of(path: Path) -> list[tuple[str, Rows, list[str]]]:
+    """Of each visible sheet, or each way to separate fields: its form, its rows, and in words what is hidden in it.
+    Raises InvalidArgument."""
+    return [
+        (
+            page.form,
+            page.rows,
+            [
+                f"{place} is hidden"
+                for place, row in page.rows
+                if place in page.hidden_rows and any(c != "" for c in row)
+            ]
+            + [f"{page.form}, column {index + 1} is hidden" for index in sorted(page.hidden_columns)],
+        )
+        for page in _found(path, None, None)
+        if not page.is_hidden
+    ]
 
 
 def _found(path: Path, separator: str | None, page: str | None) -> list[_Page]:
@@ -204,7 +218,8 @@ def _cell(cell: object, code: str | None) -> Cell:
     if isinstance(cell, int | float) and not isinstance(cell, bool):
         return float(cell) if code is None else Formatted(cell, code)
     if isinstance(cell, datetime.timedelta):
-        return str(cell.total_seconds()) + " s"
+        seconds = round(cell.total_seconds(), 3)
+        return f"{int(seconds // 3600)}:{int(seconds % 3600 // 60):02}:{seconds % 60:06.3f}"
     return str(cell).strip()
 
 

@@ -75,7 +75,10 @@ def _look(archive: ZipFile) -> dict[str, Shown]:
     names = [member.filename.replace("\\", "/").casefold() for member in members]
     if len(set(names)) < len(names):
         raise InvalidArgument("not a workbook that can be read: it has two parts of one name")
-    kind = archive.read("mimetype")[:100].decode(errors="replace") if "mimetype" in names else ""
+    kind = ""
+    if "mimetype" in names:
+        with archive.open(members[names.index("mimetype")]) as part:
+            kind = part.read(100).decode(errors="replace")  # not all of it, which may unpack without end
     if "word/document.xml" in names or kind.removeprefix("application/") in _KINDS:
         what = _KINDS.get(kind.removeprefix("application/"), "a text document")
         raise InvalidArgument(f"is {what}, no workbook: copy its table into a sheet, and save it as .xlsx or .ods")

@@ -1,7 +1,9 @@
 """The same run in sheets as people have them, each kind in ten forms: read right, or refused with the right words."""
 
+import datetime
 import io
 import re
+import tracemalloc
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -343,6 +345,33 @@ def test_sheet_is_read_right_or_refused(kind: str, form: str, tmp_path: Path) ->
     assert set(found.channels) == set(channels)
     for name, expected in channels.items():
         np.testing.assert_allclose(found.channels[name], expected, rtol=1e-14, atol=1e-18)
+
+
+def test_origin_goes_with_positions_of_the_sheet(tmp_path: Path) -> None:
+    table = Table(heads=[*HEADS[:2], *HEADS[5:]], rows=[[*row[:2], *row[5:]] for row in run()])
+    path = FORMS["xlsx"](tmp_path / "sheet", table)
+    assert len(import_files([path], plan=PLAN).measurement) == 8
+    with pytest.raises(sd.InvalidArgument, match="`origin` goes with a sheet's own"):
+        import_files([path], plan=PLAN, origin=(1.0, 0.0, 0.0))
+
+
+def test_durations_of_a_workbook_are_clock_times(tmp_path: Path) -> None:
+    table = Table().with_column("Time", [datetime.timedelta(hours=30, seconds=1.5 * k) for k in range(8)])
+    path = xlsx()(tmp_path / "sheet", replace(table, formats={8: "[h]:mm:ss"}))
+    np.testing.assert_allclose(import_files([path]).measurement.channels["time"], 1.5 * np.arange(8), atol=1e-9)
+
+
+def test_kind_of_a_document_that_unpacks_without_end_is_not_unpacked(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "bomb.ods", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("mimetype", b"x" * 2**28)
+        archive.writestr("content.xml", "<office:document-content/>")
+    tracemalloc.start()
+    try:
+        with pytest.raises(sd.InvalidArgument, match=r"bomb\.ods"):
+            import_files([tmp_path / "bomb.ods"])
+        assert tracemalloc.get_traced_memory()[1] < 2**25
+    finally:
+        tracemalloc.stop()
 
 
 def test_there_are_as_many_sheets_as_were_asked_for() -> None:

@@ -142,6 +142,27 @@ def heads(*words: str) -> str:
     return table([list(words)], ";", ",", deviation)
 
 
+@pytest.mark.parametrize("what", ["row", "column", "format"])
+def test_workbook_that_shows_something_else_is_refused(tmp_path: Path, what: str) -> None:
+    book = openpyxl.Workbook()
+    assert book.active is not None
+    book.active.append(ONE_ROW[0])
+    for k, target in enumerate(TARGETS):
+        book.active.append([target, *(values[k] for _, values in RUNS.values())])
+    if what == "row":
+        book.active.row_dimensions[3].hidden = True
+    elif what == "format":
+        book.active["C3"].number_format = '0.0" mm"'
+    else:
+        book.active.column_dimensions["C"].hidden = True
+    book.save(tmp_path / "x.xlsx")
+    with pytest.raises(
+        sd.InvalidArgument,
+        match=r"x\.xlsx.*(?:(?:row|column) 3 is hidden|the cell shows -0.6 mm, but is -0.6 µm by its head)",
+    ):
+        read_position_table(tmp_path / "x.xlsx")
+
+
 REFUSED = {
     "no direction": (
         heads("Target [mm]", "Run 1 [µm]", "Run 2 [µm]", "Run 3 [µm]", "Run 4 [µm]"),
