@@ -29,7 +29,7 @@ WHY: Final = (
 # Of the short one: what its values are, in a few words.
 _WORDS: Final = {
     "volume": "travels to measure; home is the corner (0, 0, 0)",
-    "plan": "the best one for 45 minutes: stepdiag plan FILE --minutes N looks for others",
+    "plan": "stepdiag plan FILE --minutes N looks for the best one for your machine and your time",
     "noise": "standard deviations of the instrument's readings",
     ("machine", "chain"): "from workpiece w over bed b to tool t; a prime marks the axes before b",
     ("machine", "tool_mm"): "from the tool's origin to the centre of the mirror",
@@ -108,7 +108,10 @@ def template(head: str | None = None, values: Mapping[tuple[str, str], Any] | No
         lines += [*_comment(field.description or ""), f"{name} = {show_full(field.default)}", ""]
     for part in sections(ScenarioKeys):
         active = (part.required and "." not in part.title) or any(section == part.title for section, _ in stated)
-        why = _comment(WHY) if part.title == "plan" else []
+        is_own = not any(
+            section in ("volume", "plan") for section, _ in stated
+        )  # another machine has another best plan
+        why = _comment(WHY) if part.title == "plan" and is_own else []
         lines += [*_comment(paragraphs(part.model)), *why, f"{'' if active else '# '}[{_named(part)}]"]
         for name, field in keys(part.model):
             place = (part.title, name)

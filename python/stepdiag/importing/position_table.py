@@ -17,7 +17,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.importing.columns import Column, SheetUnit, plain, split_head, unit_in
 from stepdiag.importing.numbers import decimal_mark, is_lost, native, number
 from stepdiag.importing.run import as_shown
-from stepdiag.importing.sheet import Cell, Formatted, Rows, pages_of
+from stepdiag.importing.sheet import LAST_HEAD, Cell, Formatted, Rows, pages_of
 from stepdiag.positions.readings import PositionReadings, PositionRow, readings_of
 
 _TARGETS: Final = ("target", "target_position", "targets", "position", "nominal", "soll", "sollposition", "ziel")
@@ -26,7 +26,6 @@ _DIRECTIONS: Final = {
     **dict.fromkeys(("-", "−", "↓", "backward", "bwd", "down", "rückwärts", "rück", "zurück"), "-"),
 }
 _RUN: Final = re.compile(r"(?:run|cycle|series|no\.?|lauf|zyklus|messreihe|reihe|r|c)?\s*#?(\d{1,3})")
-_LAST_HEAD: Final = 50
 _LARGEST_DEVIATION: Final = 2.0  # mm; a larger value is a position
 
 
@@ -100,7 +99,7 @@ def read_position_table(path: Path) -> tuple[PositionReadings, list[str]]:
 
 def _find(rows: Rows) -> int | None:
     """Index of the row of heads: one of targets, and one or more with the number of a run."""
-    for k, (_, row) in enumerate(rows[:_LAST_HEAD]):
+    for k, (_, row) in enumerate(rows[:LAST_HEAD]):
         words = [cell if isinstance(cell, str) else "" for cell in row]
         if any(split_head(word)[0] in _TARGETS for word in words) and any(map(_run_of, words)):
             return k

@@ -15,7 +15,7 @@ from stepdiag.io.whole_files import LARGEST_TEXT, read_bytes
 
 Cell = str | float
 Hidden = Literal["take", "leave"]
-_LAST_HEAD: Final = 50  # rows in which the heads are looked for
+LAST_HEAD: Final = 50  # rows in which the heads are looked for
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def _cell(cell: object, code: str | None) -> Cell:
 
 def _heads_of(page: _Page, mappings: Sequence[Mapped]) -> int | None:
     """Index of the row of heads."""
-    first = page.rows[:_LAST_HEAD]
+    first = page.rows[:LAST_HEAD]
     return next((k for k, (_, row) in enumerate(first) if find_heads(_texts_of(row), mappings)), None)
 
 
@@ -298,7 +298,7 @@ def _texts_of(row: Sequence[Cell]) -> list[str]:
 
 
 def _no_heads(found: Sequence[_Page]) -> str:
-    rows = max((one.rows for one in found), key=lambda rows: max((len(row) for _, row in rows[:_LAST_HEAD]), default=0))
+    rows = max((one.rows for one in found), key=lambda rows: max((len(row) for _, row in rows[:LAST_HEAD]), default=0))
     heads = next((_texts_of(row) for _, row in rows if len([cell for cell in row if cell != ""]) > 1), [])
     known = ", ".join(f'"{head}"' for head in heads if head) or "none"
     return (

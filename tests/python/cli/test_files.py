@@ -171,6 +171,7 @@ def test_init_takes_what_everybody_states(here: Path) -> None:
     every = sd.read_scenario("all/scenario.toml").known
     assert (every.plan.steps, every.head.layout) == (4, "psd")
     assert len(Path("all/scenario.toml").read_text().splitlines()) > 300
+    assert "best plan for 45 minutes" not in Path("all/scenario.toml").read_text()  # that is of another machine
 
 
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
