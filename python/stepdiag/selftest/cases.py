@@ -25,6 +25,7 @@ from stepdiag.uncertainty.monte_carlo import run_monte_carlo
 KNOWN: Final = Path(str(resources("stepdiag.selftest") / "known"))
 
 NIST: Final = "NIST Engineering Metrology Toolbox, refractive index of air"
+INDICES: Final = "the published equations, computed by a separate program with 40 digits"
 SCHOTT: Final = "SCHOTT, data sheet of N-BK7"
 RUNS: Final = "runs made from the conventions (docs/conventions.md) by a separate closed-form program"
 LIMITS: Final = "the same runs; the limits are those of the published equations (docs/method.md)"
@@ -37,6 +38,8 @@ FILES: Final = "files of these runs with one fault each"
 # for the vapour pressure, which each takes from a formula of its own.
 AIR: Final = 1e-9
 GLASS: Final = 1e-6  # six decimals
+# A root, exponentials and quotients near 1: some units in the last place.
+INDEX: Final = 2e-15
 # Readings near 1 m are rounded to 1e-13 mm, and steps add up as a random walk. Tilts of a head with several beams are
 # differences of them over 20 mm.
 ADJUSTED: Final = {"ideal": (2e-11, 1e-13), "psd": (2e-11, 1e-13), "multi_beam": (1e-10, 1e-12)}
@@ -52,34 +55,49 @@ ROTATION: Final = 1e-18  # rad
 
 
 def air(known: Path) -> Iterator[SelfTestRow]:
-    rows = list(csv.DictReader((known / "air.csv").read_text(encoding="utf-8").splitlines()))
+    printed, exact = _rows(known / "air.csv"), _rows(known / "air_exact.csv")
     for equation in ("ciddor", "modified_edlen"):
-        off = [
-            Environment.from_air(
-                temperature=float(row["temperature_c"]),
-                pressure=1e3 * float(row["pressure_kpa"]),
-                relative_humidity=1e-2 * float(row["humidity_percent"]),
-                equation=equation,
-            ).refractive_index(float(row["wavelength_nm"]))
-            - float(row[equation])
-            for row in rows
-        ]
+        off = [_index(row, 1e3 * float(row["pressure_kpa"]), equation) - float(row[equation]) for row in printed]
         yield SelfTestRow("index of air", f"{equation}, {len(off)} states", NIST, _largest(off), AIR)
+    for equation in ("ciddor", "modified_edlen", "edlen_1966"):
+        off = [_index(row, float(row["pressure_pa"]), equation) - float(row[equation]) for row in exact]
+        yield SelfTestRow("index of air", f"{equation}, {len(off)} states", INDICES, _largest(off), INDEX)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def _index(row: dict[str, str], pressure: float, equation: str) -> float:
+    environment = Environment.from_air(
+        temperature=float(row["temperature_c"]),
+        pressure=pressure,
+        relative_humidity=1e-2 * float(row["humidity_percent"]),
+        carbon_dioxide=float(row.get("co2_ppm", "450")),
+        equation=equation,
+    )
+    return float(environment.refractive_index(float(row["wavelength_nm"])))
 
 
 def glass(known: Path) -> Iterator[SelfTestRow]:
-    """Of the window of a shipped head. Index and wavelength of the catalogue are those in air, of a head in vacuum."""
-    window = find_shipped_head("three_beams").read_text(encoding="utf-8")
-    off = []
-    for row in csv.DictReader((known / "glass.csv").read_text(encoding="utf-8").splitlines()):
-        in_air, air = float(row["wavelength_nm"]), Environment.from_air(relative_humidity=0.0)
-        wavelength = in_air * air.refractive_index(in_air)
-        around = air.refractive_index(wavelength)
-        text = window.replace("wavelength_nm = 1530.0", f"wavelength_nm = {wavelength!r}")
-        design = parse_head_design(text.replace('"N-BK7"', f'"{row["glass"]}"'))
-        light = _core.trace_beams(_core.Head.from_design(design, standoff=100.0), distance=100.0)
-        off.append(max(one.index for one in light) / around - float(row["index"]))
+    off = [_in_window(row) - float(row["index"]) for row in _rows(known / "glass.csv")]
     yield SelfTestRow("index of glass", f"N-BK7, {len(off)} wavelengths", SCHOTT, _largest(off), GLASS)
+    off = [_in_window(row) - float(row["index"]) for row in _rows(known / "glass_exact.csv")]
+    yield SelfTestRow("index of glass", f"6 glasses, {len(off)} indices", INDICES, _largest(off), INDEX)
+
+
+def _in_window(row: dict[str, str]) -> float:
+    """Index of the window of a shipped head. Index and wavelength of the catalogue are those in air, of a head in
+    vacuum."""
+    window = find_shipped_head("three_beams").read_text(encoding="utf-8")
+    in_air, air = float(row["wavelength_nm"]), Environment.from_air(relative_humidity=0.0)
+    wavelength = in_air
+    for _ in range(3):
+        wavelength = in_air * air.refractive_index(wavelength)
+    text = window.replace("wavelength_nm = 1530.0", f"wavelength_nm = {wavelength!r}")
+    design = parse_head_design(text.replace('"N-BK7"', f'"{row["glass"]}"'))
+    light = _core.trace_beams(_core.Head.from_design(design, standoff=100.0), distance=100.0)
+    return max(one.index for one in light) / float(air.refractive_index(wavelength))
 
 
 def runs(known: Path) -> Iterator[SelfTestRow]:

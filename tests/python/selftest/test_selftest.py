@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+import exact_indices
 import numpy as np
 import pytest
 from compensator_oracle import Oracle
@@ -32,7 +33,7 @@ def known(tmp_path: Path) -> Path:
 
 def test_every_case_passes(found: SelfTest) -> None:
     assert [row for row in found.rows if not row.passed] == []
-    assert len(found.rows) == 72
+    assert len(found.rows) == 76
 
 
 # A file of the known truth, a pattern in it, what it becomes, and the case that must fail.
@@ -71,6 +72,11 @@ def test_a_changed_error_of_a_machine_fails(known: Path, case: str) -> None:
     rows[k] = ",".join([parameter, position, repr(float(value) + (50.0 if case == "noisy" else 1e-6)), *rest])
     path.write_text("\n".join(rows) + "\n")
     assert f"run {case}" in {row.case for row in run_selftest(known).rows if not row.passed}
+
+
+def test_exact_indices_are_those_of_the_separate_program() -> None:
+    for name, text in exact_indices.files().items():
+        assert (KNOWN / name).read_text(encoding="utf-8") == text
 
 
 def test_a_case_that_ends_with_an_error_fails(known: Path) -> None:
@@ -133,7 +139,7 @@ def test_command_writes_what_it_prints(
     out, err = capsys.readouterr()
     assert out == Path("record.txt").read_text() + "wrote record.txt\n"
     assert err == ""
-    assert "72 of 72 passed" in out
+    assert "72 of 76 passed" in out
     assert max(map(len, out.splitlines())) <= 100
 
 
@@ -143,7 +149,7 @@ def test_a_failure_ends_the_command_with_status_3(
     monkeypatch.setattr(cases, "AIR", 1e-13)
     assert main(["selftest"]) == 3
     out, err = capsys.readouterr()
-    assert "70 of 72 passed" in out
+    assert "74 of 76 passed" in out
     assert len(re.findall(r"^FAILED  index of air", out, re.M)) == 2
     assert err == "warning: the self-test failed (index of air): do not use this installation\n"
 
