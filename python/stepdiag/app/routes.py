@@ -34,7 +34,8 @@ from stepdiag.app.frame import STATIC, address, static_text
 from stepdiag.app.jobs import CommandJob, Jobs
 from stepdiag.app.live_runs import ALIGNMENT, LiveRun, LiveRuns, RawTail, event
 from stepdiag.app.screens.calibration import calibration_screen
-from stepdiag.app.screens.compensate import FORMATS, NONE, compensate_screen
+from stepdiag.app.screens.compensate import FIELDS as TABLE_FIELDS
+from stepdiag.app.screens.compensate import NONE, compensate_screen
 from stepdiag.app.screens.job import job_screen
 from stepdiag.app.screens.live import live_screen
 from stepdiag.app.screens.machine import machine_screen
@@ -47,6 +48,7 @@ from stepdiag.app.screens.trend import trend_screen
 from stepdiag.app.security import REPORT_POLICY, Guard, TooLarge
 from stepdiag.book.book import Book, Entry, MachineFolder
 from stepdiag.book.layout import main_file, safe_name
+from stepdiag.exporting.formats import FORMATS
 from stepdiag.io.data_files import date_of_today
 
 BETWEEN_STATES: Final = 0.03  # s, of a stream
@@ -316,7 +318,7 @@ class App:
         words = ["export", *self._of(machine), entry.file, "--to", to]
         words += ["--replaces", self.entry(machine, replaced).file] if replaced != NONE else []
         words += ["--incomplete"] if given.get("incomplete") else []
-        fields = FORMATS[to][1]
+        fields = [one for one in TABLE_FIELDS if one in FORMATS[to].options]
         words += _options(given, [field for field in fields if field != "at"])
         words += ["--at", *given["at"].replace(",", " ").split()] if "at" in fields and given.get("at") else []
         return self._begin(f"Table for {to}", [words], machine.name, "")

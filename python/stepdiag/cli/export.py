@@ -21,61 +21,69 @@ from stepdiag.cli.options import (
     trust_warnings,
 )
 from stepdiag.cli.terminal import say
+from stepdiag.exporting.formats import FORMATS, MAKERS, of_maker
 from stepdiag.exporting.options import ExportOptions
-from stepdiag.io.outputs import (
-    COMP_FILE,
-    COMP_LINES,
-    GRID,
-    HAL_LINES,
-    ISG_TABLE,
-    KINEMATICS_TABLE,
-    POSITION_ERROR,
-    PROGRAM,
-    SQUARENESS_TABLE,
-    OutputFile,
-    claim_folder,
-)
+from stepdiag.io.outputs import PROGRAM, OutputFile, claim_folder
 from stepdiag.program.options import Options
 from stepdiag.progress import Progress
 
-# Those of stepdiag.exporting.write.FORMATS, which is slow to import; a test compares them.
-KINDS = {
-    "linuxcnc-kins": KINEMATICS_TABLE,
-    "isg": ISG_TABLE,
-    "csv-grid": GRID,
-    "squareness": SQUARENESS_TABLE,
-    "matrix": HAL_LINES,
-    "calibxyzkins": HAL_LINES,
-    "position-error": POSITION_ERROR,
-}
-FORMATS = ("linuxcnc-comp", *KINDS)
-FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(9)}  # linuxcnc-comp
+FILES = list(dict.fromkeys(one.file for one in FORMATS.values() if one.file is not None))
+
+
+class FormatOrMaker(click.Choice[str]):
+    """A format; the name of a maker lists the formats for that maker's controllers."""
+
+    name = "format"
+
+    def __init__(self) -> None:
+        super().__init__(list(FORMATS))
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        maker = str(value).casefold()
+        if maker not in MAKERS or maker in FORMATS or ctx is None:
+            return super().convert(value, param, ctx)
+        for name, one in of_maker(maker):
+            say(f"{name}: {one.what}; for {one.controllers}; {one.tested}")
+        ctx.exit()
 
 
 def _ending(params: Mapping[str, Any]) -> str:
     """Of an export in a machine book; "/": a folder."""
-    return KINDS[params["to"]].endings[0] if params["to"] in KINDS else "/"
+    kind = FORMATS[params["to"]].file
+    return "/" if kind is None else kind.endings[0]
 
 
 @click.command(
     cls=OfMachine,
     makes={"output": Kept("exports", _ending)},
-    epilog="\b\nExamples:\n"
+    epilog="\b\nFormats:\n"
+    + "".join(f"  {name:<22}{one.what}\n" for name, one in FORMATS.items())
+    + f"\n\b\nMakers: {', '.join(MAKERS)}\n"
+    "\n\b\nExamples:\n"
     "  stepdiag export calibration.csv --to linuxcnc-kins -o machine.csv\n"
+    "  stepdiag export calibration.csv --to siemens-cec -o cec.ini\n"
     "  stepdiag export calibration.csv --to linuxcnc-comp --at 400 300 250 -o comp\n"
     "  stepdiag export calibration.csv --to csv-grid --step 25 -o grid.csv\n"
     "  stepdiag export calibration.csv --to matrix -o matrix.hal\n"
     "  stepdiag export calibration.csv --to position-error --axis Y --depends-on X -o sag.csv",
 )
 @click.argument("calibration", type=PATH)
-@click.option("--to", "to", required=True, type=click.Choice(FORMATS), help="Format.")
+@click.option(
+    "--to",
+    "to",
+    required=True,
+    is_eager=True,  # a maker's name needs no other argument
+    type=FormatOrMaker(),
+    metavar="FORMAT",
+    help="Format (below), or a maker, whose formats are listed.",
+)
 @click.option(
     "-o",
     "output",
     required=True,
-    type=Writes(*KINDS.values()),
+    type=Writes(*FILES),
     metavar="OUT",
-    help="File to write (.csv; .hal for matrix and calibxyzkins); for linuxcnc-comp a folder.",
+    help="File to write; for linuxcnc-comp and heidenhain-* a folder.",
 )
 @click.option(
     "--replaces",
@@ -98,16 +106,6 @@ def export(
 ) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
-    \b
-    linuxcnc-kins  the table of the kinematics module stepdiagkins: all 21 errors
-    linuxcnc-comp  a COMP_FILE for each joint, and the INI lines: positioning errors along three lines
-    isg            volumetric compensation of ISG-CNC and TwinCAT CNC; written from the manual, not tried
-    csv-grid       error vectors on a grid
-    squareness     the three squareness angles
-    matrix         the best 3x3 matrix, as HAL lines of LinuxCNC's matrixkins
-    calibxyzkins   the best linear and quadratic terms, as HAL lines of calibxyzkins (GTEC-UDC)
-    position-error rows of position and error of one axis along another (or itself)
-
     Reports the sign convention, the reference point, the loss by resampling, what of the 21 errors
     is left out, and for formats that leave out some, what that leaves in the volume. Refuses a
     calibration that does not determine all that the format needs, unless --incomplete is
@@ -119,10 +117,11 @@ def export(
     inputs = [calibration, *([replaces] if replaces is not None else [])]
     if replaces is not None and not replaces.exists():
         raise InvalidArgument(f"{replaces}: cannot be read: no such file")
-    if to in KINDS:
-        path = OutputFile(output.path, (KINDS[to],)).claim(*inputs)
+    asked = FORMATS[to]
+    if asked.file is not None:
+        path = OutputFile(output.path, (asked.file,)).claim(*inputs)
     else:
-        path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
+        path = claim_folder(output.path, asked.folder, marks=[asked.mark])
     options = made_of(ExportOptions, given)
     check_input(calibration)
     read = read_what_is_exported(calibration)

@@ -86,12 +86,13 @@ def volume_grid_of(errors: ErrorMap, volume: FloatArray, fewest: int = 2) -> tup
     for axis, edge in zip(AXES, volume, strict=True):
         positions = np.append(common_nodes(errors, axis), np.linspace(0.0, edge, fewest))
         axes.append(spread(inside(np.unique(positions), float(edge)), MOST_POSITIONS))
-    x, y, z = (_trapezoidal(positions) for positions in axes)
+    x, y, z = (trapezoidal(positions) for positions in axes)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return grid, np.einsum("i,j,k->ijk", x, y, z).ravel()
 
 
-def _trapezoidal(positions: FloatArray) -> FloatArray:
+def trapezoidal(positions: FloatArray) -> FloatArray:
+    """The weights of positions from 0 in a mean over their range."""
     half = 0.5 * np.diff(positions) / (positions[-1] - positions[0])
     return np.asarray(np.append(half, 0.0) + np.append(0.0, half))
 

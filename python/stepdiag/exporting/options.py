@@ -23,17 +23,36 @@ class ExportOptions:
     incomplete: bool = option(False, "Export undetermined values as 0.")
     approach: Approach | None = option(
         None,
-        "Direction of approach to compensate if the tables have two (not linuxcnc-comp, squareness).  [default: mean]",
+        "Direction of approach to compensate if the tables have two (not linuxcnc-comp, squareness).  [default: mean; "
+        "siemens-cec and heidenhain-com: both]",
     )
     at: Triple | None = option(
         None,
-        "Point on the corrected lines, mm from home (linuxcnc-comp, position-error).  [default: centre of the volume]",
+        "Point on the corrected lines, mm from home (linuxcnc-comp, position-error, siemens-*, heidenhain-com).  "
+        "[default: centre of the volume; siemens-*, heidenhain-com: that or a mean over the volume]",
         metavar=XYZ,
     )
     rows: int | None = option(
         None,
-        "Largest number of rows in a table (linuxcnc-comp, isg, position-error).  [default: 256, 5000, every node]",
+        "Largest number of rows in a table (linuxcnc-comp, isg, etalon, position-error, siemens-*, heidenhain-*).  "
+        "[default: 256, 5000, 5000, every node, 200, 200]",
         metavar="N",
+    )
+    tables: int | None = option(
+        None,
+        "Largest number of tables; those are chosen that leave least (siemens-cec: 8 of an 828D, 2 of an 802D sl).",
+        metavar="N",
+    )
+    axis_names: tuple[str, str, str] | None = option(
+        None,
+        "Names of the machine axes X, Y, Z in the controller (siemens-*).  [default: AX1 AX2 AX3]",
+        metavar="<X Y Z>",
+    )
+    fixed: Triple | None = option(
+        None,
+        "Sum of the fixed lines Trans between the tool and the axes in the machine's description, mm "
+        "(heidenhain-kinematics).  [default: 0 0 0]",
+        metavar=XYZ,
     )
     coordinates: str | None = option(
         None,
@@ -49,6 +68,6 @@ class ExportOptions:
     step: float | None = option(None, "Largest spacing of the grid, instead of --nodes (csv-grid).", metavar="MM")
     orientation: bool | None = option(None, "Also write the rotations of the tool (csv-grid).")
     squareness: Literal["straightness", "parameters"] | None = option(
-        None, "Where to write squareness (isg).  [default: straightness]"
+        None, "Where to write squareness (isg, etalon).  [default: straightness]"
     )
     accept_rejected: bool = option(False, "Export a calibration even if its fit was rejected.")

@@ -70,7 +70,7 @@ def squareness(calibration: Calibration, output: Path, options: ExportOptions) -
     known = calibration.squareness
     angles: dict[str, float] = {name: known[name][0] for name in SQUARENESSES if name in known}
     left = _left_by(calibration, options, angles)
-    fitted = _fitted_angles(calibration, options) if left is not None else {}
+    fitted = fitted_angles(calibration, options) if left is not None else {}
     with_fitted = _left_by(calibration, options, fitted) if fitted else None
     lines = [
         *heading(calibration, options, approach=False),
@@ -112,7 +112,7 @@ def _left_by(calibration: Calibration, options: ExportOptions, angles: Mapping[s
     return left_in_volume(calibration, tool_of(calibration, options), kinematics.from_home(origin_of(options)))
 
 
-def _fitted_angles(calibration: Calibration, options: ExportOptions) -> dict[str, float]:
+def fitted_angles(calibration: Calibration, options: ExportOptions) -> dict[str, float]:
     """The squarenesses that leave the least rms error in the volume, rad; the tables must be whole."""
     grid, root, error = _errors(calibration, options)
     alone = [(root * grid) @ _shear(calibration, {name: 1.0}).T for name in SQUARENESSES]

@@ -5,7 +5,7 @@ has the opposite sign. Every format states, in its file or beside it, which of t
 and for which chain, tool and reference point.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
@@ -17,6 +17,10 @@ from stepdiag._core import Calibration, InvalidArgument, read_error_map
 from stepdiag.calibration.parts import parts_of
 from stepdiag.exporting.common import tool_of
 from stepdiag.exporting.csv_grid import csv_grid
+from stepdiag.exporting.etalon import etalon
+from stepdiag.exporting.firmware import klipper, marlin, rrf
+from stepdiag.exporting.formats import FORMATS
+from stepdiag.exporting.heidenhain import heidenhain_com, heidenhain_kinematics
 from stepdiag.exporting.isg import isg
 from stepdiag.exporting.linuxcnc_comp import linuxcnc_comp
 from stepdiag.exporting.linuxcnc_kins import linuxcnc_kins
@@ -24,6 +28,7 @@ from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.polynomial import calibxyzkins, matrix, squareness
 from stepdiag.exporting.position_error import position_error
 from stepdiag.exporting.result import Export
+from stepdiag.exporting.siemens import siemens_cec, siemens_enc_comp
 from stepdiag.findings.error_map import check_angles
 from stepdiag.findings.meaning import MEANING
 from stepdiag.io.data_files import is_netcdf, read_calibration
@@ -31,16 +36,23 @@ from stepdiag.io.whole_files import check_output, make_folder, write_set
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 from stepdiag.wrong_arguments import checked
 
-# Format -> its options besides `tool`, `origin`, `incomplete` and `accept_rejected`.
-FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
-    "linuxcnc-comp": ("coordinates", "ini", "at", "rows"),
-    "linuxcnc-kins": ("approach",),
-    "isg": ("approach", "rows", "squareness"),
-    "csv-grid": ("approach", "nodes", "step", "orientation"),
-    "squareness": (),
-    "matrix": ("approach",),
-    "calibxyzkins": ("approach",),
-    "position-error": ("approach", "axis", "depends_on", "at", "rows"),
+WRITERS: Final[Mapping[str, Callable[[Calibration, Path, ExportOptions], Export]]] = {
+    "linuxcnc-kins": linuxcnc_kins,
+    "linuxcnc-comp": linuxcnc_comp,
+    "matrix": matrix,
+    "calibxyzkins": calibxyzkins,
+    "siemens-cec": siemens_cec,
+    "siemens-enc-comp": siemens_enc_comp,
+    "heidenhain-kinematics": heidenhain_kinematics,
+    "heidenhain-com": heidenhain_com,
+    "isg": isg,
+    "etalon": etalon,
+    "rrf": rrf,
+    "marlin": marlin,
+    "klipper": klipper,
+    "csv-grid": csv_grid,
+    "squareness": squareness,
+    "position-error": position_error,
 }
 
 
@@ -82,9 +94,8 @@ def export(
 
     Args:
         calibration: the calibration to export.
-        output: the file to write; for linuxcnc-comp a folder, which is created.
-        to: format, one of FORMATS (docs/exports.md): "linuxcnc-kins", "linuxcnc-comp", "isg", "csv-grid",
-            "squareness", "matrix", "calibxyzkins" or "position-error".
+        output: the file to write; for linuxcnc-comp and heidenhain-... a folder, which is created.
+        to: format (docs/your-controller.md), such as "linuxcnc-kins", "siemens-cec" or "csv-grid".
         options: ExportOptions, or its fields by name.
 
     Raises:
@@ -100,7 +111,7 @@ def export(
 def write_export(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
     """Write as `export` does, and return also what is compensated and the remaining error."""
     export = _prepare(calibration, to, output, options)
-    if to == "linuxcnc-comp":
+    if FORMATS[to].folder:
         make_folder(output)
     for path in export.files:
         check_output(path)
@@ -109,28 +120,18 @@ def write_export(calibration: Calibration, to: str, output: Path, options: Expor
 
 
 def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
-    formats = {
-        "linuxcnc-comp": linuxcnc_comp,
-        "linuxcnc-kins": linuxcnc_kins,
-        "isg": isg,
-        "csv-grid": csv_grid,
-        "squareness": squareness,
-        "matrix": matrix,
-        "calibxyzkins": calibxyzkins,
-        "position-error": position_error,
-    }
-    if to not in formats:
-        raise InvalidArgument(f"`to`: expected one of {', '.join(formats)}, got {to!r}")
-    taken = {"tool", "origin", "incomplete", "accept_rejected", *FORMATS[to]}
+    if to not in FORMATS:
+        raise InvalidArgument(f"`to`: expected one of {', '.join(FORMATS)}, got {to!r}")
+    taken = {"tool", "origin", "incomplete", "accept_rejected", *FORMATS[to].options}
     for field in fields(options):
         if field.name not in taken and getattr(options, field.name) is not None:
-            theirs = " or ".join(name for name, names in FORMATS.items() if field.name in names)
+            theirs = " or ".join(name for name, one in FORMATS.items() if field.name in one.options)
             raise InvalidArgument(f"`{field.name}`: belongs to {theirs}, not to {to}")
-    for name in ("tool", "origin", "at"):
+    for name in ("tool", "origin", "at", "fixed"):
         numbers = getattr(options, name)
         if numbers is not None and (len(numbers) != 3 or not np.all(np.isfinite(numbers))):
             raise InvalidArgument(f"`{name}`: expected three lengths in mm, got {numbers}")
     check_fit(calibration, "calibration", options.accept_rejected)
     if calibration.method == "conventional" and not np.array_equal(tool_of(calibration, options), calibration.tool):
         raise InvalidArgument("`tool`: tables of the method conventional hold for the tool of the measurement only")
-    return formats[to](calibration, output, options)
+    return WRITERS[to](calibration, output, options)

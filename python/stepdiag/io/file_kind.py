@@ -41,6 +41,11 @@ _BEGINNINGS: Final = {
     "ISG table": "// stepdiag export --to isg\n",
     "file of HAL lines": "# stepdiag export --to (?:matrix|calibxyzkins)\n",
     "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",
+    "SINUMERIK table": r"%_N_(?:AX_EEC|NC_CEC)_INI\n; stepdiag export --to siemens-",
+    "Heidenhain table": r"BEGIN (?:[XYZ]\.COM|CONFIG\.CMA|KINEMATICS\.TAB) MM\nNR ",
+    "notes beside Heidenhain tables": "stepdiag export --to heidenhain-",
+    "Etalon Exchange Format": "// stepdiag export --to etalon\n",
+    "firmware command": "[;#] stepdiag export --to (?:rrf|marlin|klipper)\n",
     "COMP_FILE": rf"(?:{_NUMBER} {_NUMBER} {_NUMBER}\n)+\Z",
     "study cells": r"(?s:.*\n)?[0-9a-f]{64} \{|\s*[0-9a-f]{1,64} ?\Z",  # also a torn first line
     "table of steps": "steps,mirror_width_mm,",

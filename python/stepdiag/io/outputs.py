@@ -57,6 +57,11 @@ POSITION_ERROR: Final = FileKind("position error table", (".csv",))
 HAL_LINES: Final = FileKind("file of HAL lines", (".hal",))
 COMP_FILE: Final = FileKind("COMP_FILE", (".comp",))
 COMP_LINES: Final = FileKind("compensation.ini", (".ini",))
+SINUMERIK_TABLE: Final = FileKind("SINUMERIK table", (".ini", ".mpf", ".arc"))
+COM_TABLE: Final = FileKind("Heidenhain table")
+HEIDENHAIN_NOTES: Final = FileKind("notes beside Heidenhain tables")
+ETALON_TABLE: Final = FileKind("Etalon Exchange Format", (".txt", ".etalon"))
+FIRMWARE_COMMAND: Final = FileKind("firmware command", (".gcode", ".g", ".cfg"))
 RAW: Final = FileKind("raw readings", (".jsonl",))
 CHECKPOINT: Final = FileKind(
     "checkpoint",

@@ -330,13 +330,6 @@ def test_compensation_asks_for_the_present_table_and_leads_back(person: TestClie
     assert ended(person, answer)["status"] == 0
 
 
-def test_formats_are_those_of_the_command() -> None:
-    from stepdiag.app.screens.compensate import FORMATS
-    from stepdiag.cli.export import FORMATS as OF_COMMAND
-
-    assert sorted(FORMATS) == sorted(OF_COMMAND)
-
-
 def test_trend_screen(person: TestClient) -> None:
     machine = "/machines/VMC-1200"
     assert "No calibration that can be used" in person.get(f"{machine}/trend").text

@@ -24,6 +24,7 @@ from stepdiag.cli.options import Writes
 from stepdiag.demo.loop import claim_loop, run_loop
 from stepdiag.demo.loop_job import Calculated
 from stepdiag.demo.paper import claim_demo, run_demo
+from stepdiag.exporting.formats import FORMATS
 from stepdiag.io.file_kind import kind_of_file
 from stepdiag.twin.server import Twin
 
@@ -70,6 +71,10 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
         (["calibration.csv", "--to", "squareness", "-o", OUT], (".csv",)),
         (["calibration.csv", "--to", "matrix", "-o", OUT], (".hal",)),
         (["calibration.csv", "--to", "calibxyzkins", "-o", OUT], (".hal",)),
+        (["calibration.csv", "--to", "siemens-cec", "-o", OUT], (".ini", ".mpf", ".arc")),
+        (["calibration.csv", "--to", "siemens-enc-comp", "-o", OUT], (".ini",)),
+        (["calibration.csv", "--to", "etalon", "-o", OUT], (".txt", ".etalon")),
+        (["calibration.csv", "--to", "klipper", "-o", OUT], (".gcode", ".g", ".cfg")),
         (["calibration.csv", "--to", "position-error", "--axis", "Y", "--depends-on", "X", "-o", OUT], (".csv",)),
     ],
     ("selftest", "output"): [(["-o", OUT], (".txt",))],
@@ -408,8 +413,9 @@ def test_init_replaces_nothing(folder: Path) -> None:
         assert main(["init", "-o", "run.csv"]) == 2
 
 
-def test_folder_of_comp_files_is_written_again_if_it_is_ours(made: Made, folder: Path) -> None:
-    export = ["export", "calibration.csv", "--to", "linuxcnc-comp", "-o", "comp"]
+@pytest.mark.parametrize("to", [to for to, one in FORMATS.items() if one.folder])
+def test_folder_of_tables_is_written_again_if_it_is_ours(made: Made, folder: Path, to: str) -> None:
+    export = ["export", "calibration.csv", "--to", to, "-o", "comp"]
     assert main(export) == 0
     written = content(Path("comp"))
     assert main(export) == 0
@@ -419,6 +425,6 @@ def test_folder_of_comp_files_is_written_again_if_it_is_ours(made: Made, folder:
             with nothing_is_lost(folder, name):
                 assert main(export) == 2
         Path("comp", name).write_bytes(data)
-    Path("comp/compensation.ini").unlink()
+    Path("comp", FORMATS[to].mark).unlink()
     with nothing_is_lost(folder, "somebody else's tables"):
         assert main(export) == 2

@@ -13,6 +13,7 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.display import visible
+from stepdiag.exporting.formats import FORMATS
 
 HOSTILE = "\x1b[31mred\x07\x00\u202egnp.exe\u2066\x9b2J"
 UNSEEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
@@ -45,10 +46,11 @@ def test_texts_of_the_command_line_do_not_act_on_a_page(calibrated: Path) -> Non
     assert not UNSEEN.search(own)
 
 
-@pytest.mark.parametrize("to", ["csv-grid", "squareness", "isg", "linuxcnc-comp", "matrix", "linuxcnc-kins"])
+@pytest.mark.parametrize("to", [to for to in FORMATS if to != "position-error"])
 def test_texts_of_a_calibration_do_not_act_in_a_table(calibrated: Path, to: str) -> None:
     hostile = hostile_copy()
-    out = Path("table.hal" if to == "matrix" else "table" if to == "linuxcnc-comp" else "table.csv")
+    kind = FORMATS[to].file
+    out = Path("table" if kind is None else f"table{kind.endings[0]}")
     assert main(["export", str(hostile), "--to", to, "-o", str(out), "--incomplete"]) in (0, 3)
     written = [
         path for path in calibrated.rglob("*") if path.is_file() and "table" in str(path.relative_to(calibrated))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from refusal import refused
 from usual import CHAIN, DIAGONALS, SMALL_VOLUME, small_plan
 
 import stepdiag as sd
-from stepdiag.cli import export as cli_export
 from stepdiag.cli import main
-from stepdiag.exporting.write import FORMATS
+from stepdiag.exporting.formats import FORMATS, MAKERS, of_maker
+from stepdiag.exporting.write import WRITERS
 
 OUTPUT = {
     "linuxcnc-comp": "comp",
@@ -26,6 +27,14 @@ OUTPUT = {
     "matrix": "matrix.hal",
     "calibxyzkins": "calibxyzkins.hal",
     "position-error": "error.csv",
+    "siemens-cec": "cec.ini",
+    "siemens-enc-comp": "enc_comp.ini",
+    "heidenhain-com": "com",
+    "heidenhain-kinematics": "kinematics",
+    "etalon": "etalon.txt",
+    "rrf": "config.g",
+    "marlin": "marlin.gcode",
+    "klipper": "klipper.gcode",
 }
 # What these tests take for the axes that position-error needs.
 POSITIONING = {axis: {"axis": axis, "depends_on": axis} for axis in "XZ"}
@@ -43,7 +52,17 @@ def axes_of(to: str) -> list[str]:
 
 
 def test_the_command_knows_the_formats_of_the_library() -> None:
-    assert tuple(FORMATS) == cli_export.FORMATS
+    assert list(FORMATS) == list(WRITERS)
+
+
+@pytest.mark.parametrize("maker", MAKERS)
+def test_a_makers_name_lists_its_formats(maker: str, capsys: pytest.CaptureFixture[str]) -> None:
+    if maker in FORMATS:  # a format itself
+        return
+    assert main(["export", "--to", maker]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in listed] == [name for name, _ in of_maker(maker)]
+    assert all(one.tested in line for line, (_, one) in zip(listed, of_maker(maker), strict=True))
 
 
 @pytest.mark.parametrize("to", FORMATS)
@@ -77,14 +96,12 @@ def test_every_export_says_for_which_temperature_it_is(
     calibration = sd.Calibration(**parts_of(random_calibration(5)), **temperature)
     report = export(calibration, to, tmp_path / OUTPUT[to], **POSITIONING["X"] if to == "position-error" else {})
     assert any(line.startswith("temperature: ") and said in line for line in report)
-    folder = tmp_path / OUTPUT[to]
-    lines = (folder / "compensation.ini" if folder.is_dir() else folder).read_text("utf-8").splitlines()
+    written = tmp_path / OUTPUT[to] / FORMATS[to].mark
+    lines = written.read_text("utf-8").splitlines()
     if to == "linuxcnc-kins":  # a calibration file, with the keys of one
         assert not in_table or f"# {in_table}" in lines
         return
-    table = OUTPUT[to].endswith(".csv") and to != "isg"
-    comment, separator = ("//", ": ") if to == "isg" else ("#", "=" if table else ": ")
-    (line,) = [line for line in lines if line.startswith(f"{comment} temperature{separator}")]
+    (line,) = [line for line in lines if re.match(r"(?:# |// |; )?temperature(?:: |=)", line)]
     assert said.replace("°C", "degC") in line
     assert line.isascii()
 
@@ -96,9 +113,9 @@ def test_netcdf_and_csv_are_exported_alike(calibration_file: Path, to: str) -> N
     texts = []
     for name in ("calibration.csv", "calibration.nc"):
         assert main(["export", name, "--to", to, "-o", OUTPUT[to], *axes_of(to)]) == 0
-        file = Path(OUTPUT[to]) / "joint1.comp" if to == "linuxcnc-comp" else Path(OUTPUT[to])
-        texts.append(file.read_text())
-    assert texts[0] == texts[1]
+        files = [Path(OUTPUT[to]) / name for name in FORMATS[to].folder] or [Path(OUTPUT[to])]
+        texts.append([file.read_text() for file in files if file.exists()])
+    assert texts[0] == texts[1] != []
 
 
 @pytest.mark.parametrize("to", FORMATS)
@@ -114,12 +131,15 @@ def test_netcdf_and_csv_are_exported_alike(calibration_file: Path, to: str) -> N
         ("squareness", "parameters"),
         ("axis", "X"),
         ("depends_on", "Y"),
+        ("tables", 4),
+        ("axis_names", ("X1", "Y1", "Z1")),
+        ("fixed", (0.0, 0.0, 100.0)),
     ],
 )
 def test_an_option_of_another_format_is_refused(tmp_path: Path, to: str, option: str, value: Any) -> None:
     calibration, path = random_calibration(5), tmp_path / "out"
     needed = POSITIONING["X"] if to == "position-error" else {}
-    if option in FORMATS[to]:
+    if option in FORMATS[to].options:
         assert export(calibration, to, path, **needed | {option: value})
     else:
         refused(export, calibration, to, path, names=f"`{option}`", **{option: value})
@@ -168,7 +188,7 @@ def test_what_an_error_map_lacks_is_0(
 @pytest.mark.parametrize(
     ("arguments", "names"),
     [
-        (["calibration.csv", "--to", "heidenhain", "-o", "x"], "--to"),
+        (["calibration.csv", "--to", "fanuc", "-o", "x"], "--to"),
         (["calibration.csv", "-o", "x"], "--to"),
         (["calibration.csv", "--to", "isg"], "-o"),
         (["calibration.csv", "--to", "isg", "-o", "calibration.csv"], "is also an input"),

@@ -4,27 +4,16 @@ Before a table is made, the person gives the one that the controller has now, or
 the book, and each table names the one that it replaces.
 """
 
-from collections.abc import Mapping
 from typing import Final
 
 from starlette.responses import HTMLResponse
 
 from stepdiag.app.frame import address, banner, day, drop, file_address, page
 from stepdiag.book.book import Entry, MachineFolder
+from stepdiag.exporting.formats import FORMATS
 from stepdiag.presentation.page.html import Markup, element, markup, section, table
 
-# Format -> what it is, and the fields of the form that it uses beside those of all formats. A test compares them with
-# those of the command.
-FORMATS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
-    "linuxcnc-kins": ("LinuxCNC, all 21 errors (module stepdiagkins)", ()),
-    "linuxcnc-comp": ("LinuxCNC, positioning of each joint (COMP_FILE)", ("at",)),
-    "matrix": ("LinuxCNC, best matrix (matrixkins)", ()),
-    "calibxyzkins": ("LinuxCNC, linear and quadratic terms (calibxyzkins)", ()),
-    "isg": ("ISG kernel, TwinCAT CNC: volumetric compensation", ()),
-    "csv-grid": ("error vectors on a grid (CSV)", ("step",)),
-    "squareness": ("the three squarenesses (CSV)", ()),
-    "position-error": ("one axis along another (CSV)", ("axis", "depends_on", "at")),
-}
+FIELDS: Final = ("at", "step", "axis", "depends_on")  # of the form, as far as a format has them
 NONE: Final = "none"  # the controller has no table
 
 
@@ -76,7 +65,7 @@ def _form(machine: MachineFolder, entry: Entry) -> Markup:
     kept = [element("option", "choose …", value="")]
     kept += [element("option", "the controller has no table", value=NONE)]
     kept += [element("option", f"{one.file} ({one.date[:10]})", value=one.file) for one in reversed(tables)]
-    formats = [element("option", f"{words} – {key}", value=key) for key, (words, _) in FORMATS.items()]
+    formats = [element("option", f"{one.controllers}: {one.what} – {key}", value=key) for key, one in FORMATS.items()]
     axes = [element("option", axis, value=axis) for axis in "XYZ"]
     return section(
         "table",
@@ -87,7 +76,7 @@ def _form(machine: MachineFolder, entry: Entry) -> Markup:
             _field("to", "Controller", element("select", *formats, id="to", name="to")),
             _field(
                 "at",
-                "Lines through X Y Z, mm (COMP_FILE, one axis)",
+                "Lines through X Y Z, mm (tables of one axis)",
                 element("input", id="at", name="at", placeholder="centre"),
             ),
             _field(
