@@ -11,7 +11,7 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, out_file, tell
 from stepdiag.cli.terminal import plain, say
-from stepdiag.io.outputs import MEASUREMENT, SELFTEST, OutputFile
+from stepdiag.io.outputs import IMPORTED_MAP, MEASUREMENT, SELFTEST, OutputFile
 from stepdiag.progress import Progress
 
 HEADS: Final = ("ideal", "psd", "multi_beam")
@@ -287,10 +287,12 @@ def selftest(context: click.Context, output: OutputFile | None, as_json: bool) -
     "--origin",
     type=float,
     nargs=3,
-    default=(0.0, 0.0, 0.0),
     metavar="X Y Z",
-    help="The sheet's coordinates of home, mm.",
+    help="The file's coordinates of home, mm.  [default: 0 0 0; tables of controllers: as they say, or their first]",
 )
+@click.option("--chain", metavar="CHAIN", help="Chain of the machine, for tables of controllers that do not say it.")
+@click.option("--volume", type=float, nargs=3, metavar="X Y Z", help="Volume, mm, likewise.  [default: their end]")
+@click.option("--tool", type=float, nargs=3, metavar="X Y Z", help="Tool offset, mm, likewise.  [default: 0 0 0]")
 @click.option("--scenario", type=PATH, metavar="FILE", help="Take the commanded positions from this scenario's plan.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing measurement of this name.")
 def import_(
@@ -302,7 +304,10 @@ def import_(
     sheet: str | None,
     hidden: Literal["take", "leave"] | None,
     first_point: int | None,
-    origin: tuple[float, float, float],
+    origin: tuple[float, float, float] | None,
+    chain: str | None,
+    volume: tuple[float, float, float] | None,
+    tool: tuple[float, float, float] | None,
     scenario: Path | None,
     overwrite: bool,
 ) -> None:
@@ -312,7 +317,28 @@ def import_(
     .ods). Heads may have any case, and units in brackets: "Spot X [µm]". The command prints what
     it took each column for. Where a file can be read in two ways it says which, and does not
     choose. Several files become one measurement.
+
+    Or FILE is an error map in the form of a controller or of another program, which becomes one of
+    stepdiag: Etalon Exchange Format (TRAC-CAL), ISG CSV, SINUMERIK, Heidenhain .COM, COMP_FILEs by
+    their compensation.ini, a firmware's command. It can be plotted, compared, exported, verified.
     """
+    from stepdiag.importing.controller_tables import is_controller_table, read_controller_tables
+
+    tables = [is_controller_table(file) for file in files]
+    if all(tables):
+        given = {"column": columns, "separator": separator, "decimal": decimal, "sheet": sheet, "scenario": scenario}
+        if other := next((name for name, value in given.items() if value), None):
+            raise InvalidArgument(f"`{other}`: belongs to sheets of readings; {files[0]} is a controller's table")
+        path = OutputFile(output.path, (IMPORTED_MAP,)).claim(*files)
+        found_map = read_controller_tables(files, chain=chain, volume=volume, tool=tool, origin=origin)
+        found_map.errors.write(path, chain=found_map.chain, volume=found_map.volume, tool=found_map.tool)
+        for line in found_map.text:
+            say(line)
+        return
+    if any((chain, volume, tool)):
+        raise InvalidArgument(
+            f"{files[tables.index(False)]}: no table of a controller; `chain`, `volume`, `tool` go with one"
+        )
     from stepdiag.importing.run import import_files
     from stepdiag.io.data_files import write_measurement
     from stepdiag.scenario.description import read_scenario
@@ -334,7 +360,7 @@ def import_(
             sheet=sheet,
             hidden=hidden,
             first_point=first_point,
-            origin=origin,
+            origin=origin or (0.0, 0.0, 0.0),
             plan=described.known.plan if described else None,
         )
     write_measurement(found.measurement, path)

@@ -71,6 +71,7 @@ CHECKPOINT: Final = FileKind(
 CELLS: Final = FileKind("study cells", (), "cells of an interrupted study; `resume` continues it, or delete the file")
 # Files of the demonstrations.
 ERROR_MAP: Final = FileKind("error map")
+IMPORTED_MAP: Final = FileKind("error map", (".csv",))
 REPORT: Final = FileKind("report of the demonstration")
 POINTS: Final = FileKind("table of points")
 
