@@ -32,7 +32,7 @@ BELOW: dict[str, set[str]] = {
     "importing": {"scenario", "positions"},
     "uncertainty": {"scenario"},
     "planning": {"uncertainty", "rechecking"},
-    "program": {"planning", "option_field"},
+    "program": {"planning", "exporting"},
     "exporting": {"io", "option_field"},
     "mistakes": {"scenario"},
     "evaluation": {"mistakes"},

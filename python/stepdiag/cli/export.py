@@ -1,6 +1,7 @@
 """Commands that write files for controllers: a calibration, and the measuring program of a plan."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,12 @@ def _ending(params: Mapping[str, Any]) -> str:
     metavar="TABLE",
     help="The table that the controller has now: is kept as it is, and named, so that you can go back to it.",
 )
+@click.option(
+    "--proof",
+    type=Writes(PROGRAM),
+    metavar="FILE",
+    help="Also write a short program that shows at two places whether the table helps, and say what to expect there.",
+)
 @options_of(ExportOptions)
 @json_option
 @click.pass_context
@@ -101,6 +108,7 @@ def export(
     to: str,
     output: OutputFile,
     replaces: Path | None,
+    proof: OutputFile | None,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -112,7 +120,7 @@ def export(
     given. An error map is accepted as well; parameters that it lacks are 0.
     """
     from stepdiag.exporting.write import check_fit, read_what_is_exported, write_export
-    from stepdiag.io.whole_files import check_input
+    from stepdiag.io.whole_files import check_input, write_whole
 
     inputs = [calibration, *([replaces] if replaces is not None else [])]
     if replaces is not None and not replaces.exists():
@@ -122,12 +130,19 @@ def export(
         path = OutputFile(output.path, (asked.file,)).claim(*inputs)
     else:
         path = claim_folder(output.path, asked.folder, marks=[asked.mark])
+    program = proof.claim(*inputs) if proof is not None else None
     options = made_of(ExportOptions, given)
     check_input(calibration)
     read = read_what_is_exported(calibration)
     check_fit(read, f"{calibration}", options.accept_rejected)
     with Progress("export"):
         done = write_export(read, to, path, options)
+    if program is not None:
+        from stepdiag.program.proof import proof_program
+
+        text, said = proof_program(read, done, options, asked.maker)
+        write_whole(program, text)
+        done = replace(done, report=[*done.report, *said])
     if as_json:
         from stepdiag.presentation.objects.export import export_object
         from stepdiag.presentation.objects.writer import json_text

@@ -106,4 +106,4 @@ def _export(
     ]
     comments = [f"stepdiag export --to {to}", *provenance_rows(calibration), *lines]
     text = in_ascii("\n".join([*(f"{comment} {line}" for line in comments), *command(xy, xz, yz), ""]))
-    return Export({output: text}, lines, coverage_of(calibration, SQUARENESSES), left, {"fitted": angles})
+    return Export({output: text}, lines, coverage_of(calibration, SQUARENESSES), left, {"fitted": angles}, motors)

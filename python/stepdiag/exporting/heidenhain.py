@@ -69,7 +69,7 @@ def heidenhain_com(calibration: Calibration, output: Path, options: ExportOption
     named = {"ACTIVE": "*"} | {axis: f"{axis}.COM" for axis in AXES}
     files[output / "config.cma"] = _words_table("CONFIG.CMA", [named])
     files[output / COMPANION] = _companion("heidenhain-com", calibration, lines)
-    return Export(files, lines, tables.coverage(calibration), left)
+    return Export(files, lines, tables.coverage(calibration), left, motors=tables.motors)
 
 
 def heidenhain_kinematics(calibration: Calibration, output: Path, options: ExportOptions) -> Export:

@@ -81,7 +81,7 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
     positioning = [f"E{axis}{axis}" for axis in AXES]
     coverage = coverage_of(calibration, positioning, [name for name in _needed() if name not in positioning])
     paste = f"note: paste the lines of {output / COMPANION} into the INI file"
-    return Export(files, [*head, *losses, *said, paste], coverage, left)
+    return Export(files, [*head, *losses, *said, paste], coverage, left, motors=motors)
 
 
 def _needed() -> list[str]:

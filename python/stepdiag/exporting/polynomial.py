@@ -99,7 +99,14 @@ def squareness(calibration: Calibration, output: Path, options: ExportOptions) -
     leading = csv_leading(SQUARENESS_FORMAT, calibration, options, lines)
     text = csv_text(["parameter", "axes", *columns, "fitted_urad"], rows, leading)
     values = {"squareness": angles, "fitted": fitted or None, "with_fitted": with_fitted}
-    return Export({output: text}, lines, coverage_of(calibration, SQUARENESSES), left, values)
+    return Export(
+        {output: text},
+        lines,
+        coverage_of(calibration, SQUARENESSES),
+        left,
+        values,
+        _motors_by(calibration, options, angles),
+    )
 
 
 def _shear(calibration: Calibration, angles: Mapping[str, float]) -> FloatArray:
@@ -108,8 +115,11 @@ def _shear(calibration: Calibration, angles: Mapping[str, float]) -> FloatArray:
 
 
 def _left_by(calibration: Calibration, options: ExportOptions, angles: Mapping[str, float]) -> LeftInVolume | None:
-    kinematics = Polynomial(np.eye(3) + _shear(calibration, angles))
-    return left_in_volume(calibration, tool_of(calibration, options), kinematics.from_home(origin_of(options)))
+    return left_in_volume(calibration, tool_of(calibration, options), _motors_by(calibration, options, angles))
+
+
+def _motors_by(calibration: Calibration, options: ExportOptions, angles: Mapping[str, float]) -> Motors:
+    return Polynomial(np.eye(3) + _shear(calibration, angles)).from_home(origin_of(options))
 
 
 def fitted_angles(calibration: Calibration, options: ExportOptions) -> dict[str, float]:
@@ -126,7 +136,8 @@ def matrix(calibration: Calibration, output: Path, options: ExportOptions) -> Ex
     fitted, missing = _fitted(calibration, options, powers=1)
     tool, origin = tool_of(calibration, options), origin_of(options)
     inverse = np.asarray(np.linalg.inv(fitted.linear), dtype=np.float64)
-    left = left_in_volume(calibration, tool, fitted.from_home(origin))
+    motors = fitted.from_home(origin)
+    left = left_in_volume(calibration, tool, motors)
     moved = inverse @ origin - origin
     lines = [
         *heading(calibration, options),
@@ -149,14 +160,15 @@ def matrix(calibration: Calibration, output: Path, options: ExportOptions) -> Ex
     comments += [f"C, row {axis}: {_numbers(row)}" for axis, row in zip(AXES, inverse, strict=True)]
     text = _hal("matrix", calibration, [*lines, *comments], _set("matrixkins.C_{}{}", inverse))
     coverage = coverage_of(calibration, SQUARENESSES, FUNCTIONS)
-    return Export({output: text}, lines, coverage, left, {"linear": fitted.linear})
+    return Export({output: text}, lines, coverage, left, {"linear": fitted.linear}, motors)
 
 
 def calibxyzkins(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """HAL lines for calibxyzkins of GTEC-UDC: linear and quadratic parts."""
     fitted, missing = _fitted(calibration, options, powers=2)
     tool, origin = tool_of(calibration, options), origin_of(options)
-    left = left_in_volume(calibration, tool, fitted.from_home(origin))
+    motors = fitted.from_home(origin)
+    left = left_in_volume(calibration, tool, motors)
     lines = [
         *heading(calibration, options),
         "model: position = A joints + B joints^2 + c, of the functional point; A and B have the least rms error over "
@@ -190,7 +202,7 @@ def calibxyzkins(calibration: Calibration, output: Path, options: ExportOptions)
         ],
     )
     values = {"linear": fitted.linear, "quadratic": fitted.quadratic, "constant": fitted.constant}
-    return Export({output: text}, lines, coverage_of(calibration, SQUARENESSES, FUNCTIONS), left, values)
+    return Export({output: text}, lines, coverage_of(calibration, SQUARENESSES, FUNCTIONS), left, values, motors)
 
 
 def _fitted(calibration: Calibration, options: ExportOptions, powers: int) -> tuple[Polynomial, list[str]]:

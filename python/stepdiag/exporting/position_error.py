@@ -81,7 +81,7 @@ def position_error(calibration: Calibration, output: Path, options: ExportOption
         [repr(float(p + origin[by])), f"{e * 1e3 + 0.0:.9f}"] for p, e in zip(nodes[kept], error[kept], strict=True)
     ]
     leading = csv_leading(FORMAT, calibration, options, lines, more)
-    return Export({output: csv_text(["position_mm", "error_um"], rows, leading)}, lines, coverage, left)
+    return Export({output: csv_text(["position_mm", "error_um"], rows, leading)}, lines, coverage, left, motors=motors)
 
 
 def _index_of(name: str, letter: str | None) -> int:

@@ -15,7 +15,7 @@ from stepdiag.exporting.common import (
     undetermined_of,
     words,
 )
-from stepdiag.exporting.left_in_volume import LeftInVolume
+from stepdiag.exporting.left_in_volume import LeftInVolume, Motors
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.findings.meaning import trust_rows, unverified_key
 from stepdiag.io.csv_text import lengths
@@ -57,6 +57,7 @@ class Export:
     coverage: Coverage
     left: LeftInVolume | None = None  # None: not known, or not computed (all 21 are compensated)
     values: Mapping[str, Any] = field(default_factory=dict)  # the numbers of a format of few numbers
+    motors: Motors | None = None  # where its controller sends the motors; None: to the exact inverse
 
     @property
     def told(self) -> list[str]:

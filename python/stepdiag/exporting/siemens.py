@@ -61,7 +61,7 @@ def siemens_enc_comp(calibration: Calibration, output: Path, options: ExportOpti
         body += [f"$AA_ENC_COMP_STEP[0,{name}]={step}", f"$AA_ENC_COMP_MIN[0,{name}]={first}"]
         body += [f"$AA_ENC_COMP_MAX[0,{name}]={last}", f"$AA_ENC_COMP_IS_MODULO[0,{name}]=0"]
     text = _text("%_N_AX_EEC_INI", "siemens-enc-comp", calibration, lines, body)
-    return Export({output: text}, lines, tables.coverage(calibration), left)
+    return Export({output: text}, lines, tables.coverage(calibration), left, motors=tables.motors)
 
 
 def siemens_cec(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
@@ -90,7 +90,7 @@ def siemens_cec(calibration: Calibration, output: Path, options: ExportOptions) 
         body += [f"$AN_CEC_STEP[{t}]={step}", f"$AN_CEC_MIN[{t}]={first}", f"$AN_CEC_MAX[{t}]={last}"]
         body += [f"$AN_CEC_DIRECTION[{t}]={direction}", f"$AN_CEC_MULT_BY_TABLE[{t}]=0", f"$AN_CEC_IS_MODULO[{t}]=0"]
     text = _text("%_N_NC_CEC_INI", "siemens-cec", calibration, lines, body)
-    return Export({output: text}, lines, tables.coverage(calibration), left)
+    return Export({output: text}, lines, tables.coverage(calibration), left, motors=tables.motors)
 
 
 def _points(options: ExportOptions) -> int:

@@ -77,6 +77,9 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
         (["calibration.csv", "--to", "klipper", "-o", OUT], (".gcode", ".g", ".cfg")),
         (["calibration.csv", "--to", "position-error", "--axis", "Y", "--depends-on", "X", "-o", OUT], (".csv",)),
     ],
+    ("export", "proof"): [
+        (["calibration.csv", "--to", "siemens-cec", "-o", "cec.ini", "--proof", OUT], (".mpf", ".txt"))
+    ],
     ("selftest", "output"): [(["-o", OUT], (".txt",))],
     ("head show", "output"): [(["three_beams.toml", "-o", OUT], (".png", ".svg", ".pdf"))],
 }

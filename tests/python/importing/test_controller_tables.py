@@ -171,7 +171,7 @@ def test_damaged_siemens_tables_are_refused(tmp_path: Path) -> None:
         ("$AN_CEC[0,3]=", "$AN_CEC[0,30]=", "table 0: '0,3' is missing"),
         ("$AN_CEC_IS_MODULO[1]=0", "$AN_CEC_IS_MODULO[1]=1", "IS_MODULO is set"),
         ("$AN_CEC_INPUT_AXIS[2]=(AX3)", "$AN_CEC_INPUT_AXIS[2]=(B1)", "got 'B1'"),
-        ("$AN_CEC_STEP[0]=", "$AN_CEC_STEP[0]==", "expected $NAME[index]=value"),
+        ("$AN_CEC_STEP[0]=", "$AN_CEC_STEP(0)=", "expected $NAME[index]=value"),
     ]:
         assert right in text, right
         file.write_text(text.replace(right, wrong))
