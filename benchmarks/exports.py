@@ -24,6 +24,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python" / "helpers"))
 
 import numpy as np
+from controllers import INTERPRETERS, Motors
 from exported import CompFile, GridFile, calibration_of, machine_of
 from simple_exports import MOTORS
 from usual import ALL_CHAINS, CHAIN, VOLUME
@@ -36,13 +37,17 @@ from stepdiag.exporting.linuxcnc_comp import JointTable
 from stepdiag.exporting.write import write_export
 
 TOOL = (0.0, 0.0, 120.0)
-STATED = 1e-9  # mm: rounding, of files with nine digits after the point
+STATED = 1e-5  # mm: rounding, of files with six digits after the point, of which nine are added
 Vectors = np.ndarray
 Sizes = dict[str, tuple[float, float]]  # export -> largest and rms error, mm
 
 
 def by_comp_files(folder: Path, p: Vectors) -> Vectors:
     return np.stack([CompFile(folder / f"joint{n}.comp").motor(p[:, n], "+") for n in range(3)], axis=1)
+
+
+def cec_motors(path: Path, p: Vectors) -> Vectors:
+    return INTERPRETERS["siemens-cec"](path, p, 1, 1.0)
 
 
 def by_grid(path: Path, p: Vectors) -> Vectors:
@@ -59,7 +64,7 @@ def of_machine(calibration: sd.Calibration, folder: Path) -> tuple[Sizes, bool]:
     found: Sizes = {}
     holds = True
 
-    def add(name: str, to: str, path: Path, motors: Callable[[Path, Vectors], Vectors], **options: str) -> None:
+    def add(name: str, to: str, path: Path, motors: Callable[[Path, Vectors], Vectors], **options: object) -> None:
         nonlocal holds
         done = write_export(calibration, to, path, ExportOptions(**options))  # type: ignore[arg-type]
         left = left_in_volume(calibration, np.array(TOOL), lambda p, _: motors(path, p))
@@ -85,6 +90,14 @@ def of_machine(calibration: sd.Calibration, folder: Path) -> tuple[Sizes, bool]:
     left = left_in_volume(calibration, np.array(TOOL), lambda p, _: by_all_position_errors(paths, p))
     assert left is not None
     found["`position-error`, all nine"] = left.with_it.largest, left.with_it.rms
+    for to, interpreter in INTERPRETERS.items():
+
+        def by_manual(path: Path, p: Vectors, interpreter: Motors = interpreter) -> Vectors:
+            return interpreter(path, p, 1, 1.0)
+
+        add(f"`{to}`", to, folder / to, by_manual)
+    for tables in (2, 8):
+        add(f"`siemens-cec`, {tables} tables", "siemens-cec", folder / "few", cec_motors, tables=tables)
     add("`csv-grid`, 11 x 11 x 11", "csv-grid", folder / "g.csv", by_grid)
     write_export(calibration, "linuxcnc-kins", folder / "k.csv", ExportOptions())
     compensator = sd.Compensator(folder / "k.csv", calibration.chain)
