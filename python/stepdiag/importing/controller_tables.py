@@ -97,13 +97,16 @@ def read_controller_tables(
     check_angles(errors, str(files[0]))
     if any(read.tool_side for _, read in reads):
         errors = _of_own_frames(errors, Chain(named), home)
+    errors, moved = _with_squarenesses(errors)
     text = [f"{path}: {read.form}" for path, read in reads]
     text += [f"{path}: left out, as no error of X, Y or Z: {', '.join(r.ignored)}" for path, r in reads if r.ignored]
     text.append(
         f"chain {named}, volume {_words(edges)} mm, tool offset {_words(offset)} mm, home at {_words(home)} mm "
         "of the file"
     )
-    lacking = [name for name in (*FUNCTIONS, *SQUARENESSES) if name not in functions and name not in squareness]
+    text += [f"squareness was in the straightnesses; from end to end of them: {', '.join(moved)}"] if moved else []
+    known = {*errors.functions, *errors.squareness}
+    lacking = [name for name in (*FUNCTIONS, *SQUARENESSES) if name not in known]
     text += [f"not in the file: {', '.join(lacking)}"] if lacking else []
     text.append("sign: values are taken as errors, actual - commanded; a table of corrections has the opposite sign")
     return ImportedMap(errors, Chain(named).name, (edges[0], edges[1], edges[2]), offset, text)
@@ -159,6 +162,29 @@ def _of_own_frames(errors: ErrorMap, chain: Chain, home: FloatArray) -> ErrorMap
             by_turns = Machine(chain, ErrorMap(turned), lever).first_order_error(line)
             functions[name] = position, value - (by_turns - at_home)[:, AXES.index(name[1])]
     return ErrorMap(functions, errors.squareness)
+
+
+# Of a squareness, the straightness whose slope it is, and the sign.
+_SLOPE_OF: Final = {"C0Y": ("EXY", -1.0), "B0Z": ("EXZ", 1.0), "A0Z": ("EYZ", -1.0)}
+
+
+def _with_squarenesses(errors: ErrorMap) -> tuple[ErrorMap, list[str]]:
+    """The same errors with squarenesses, if a file has none: the slopes of straightnesses, from their first to their
+    last node, which then are 0 at both ends. Also their names and values."""
+    if errors.squareness:
+        return errors, []
+    functions, negative, squareness = dict(errors.functions), dict(errors.negative_functions), {}
+    for name, (straightness, sign) in _SLOPE_OF.items():
+        if straightness in functions:
+            position, value = functions[straightness]
+            slope = float((value[-1] - value[0]) / (position[-1] - position[0])) if len(position) > 1 else 0.0
+            squareness[name] = sign * slope
+            for tables in (functions, negative):
+                if straightness in tables:
+                    x, own = tables[straightness]
+                    tables[straightness] = x, own - slope * x
+    said = [f"{name} {angle / MICRORADIAN:.4g} µrad" for name, angle in squareness.items()]
+    return ErrorMap(functions, squareness, negative_functions=negative), said
 
 
 # --- the formats ---

@@ -142,7 +142,9 @@ def test_etalon_file_of_others(
     assert main(["plot", "map.csv", "-o", "map.png"]) in (0, 3)
     assert main(["export", "map.csv", "--to", "etalon", "-o", "again.txt"]) in (0, 3)
     assert main(["import", "again.txt", "-o", "again.csv"]) == 0
-    assert sd.read_error_map("again.csv").functions["EXY"][1] == pytest.approx(value, abs=1e-8)
+    again = sd.read_error_map("again.csv")  # with squarenesses, which its own file had in the straightnesses
+    assert again.functions["EXY"][1] - again.squareness["C0Y"] * position == pytest.approx(value, abs=1e-8)
+    assert again.squareness["A0Z"] == pytest.approx(0.000047622950, abs=1e-12)
 
 
 @pytest.mark.parametrize(
