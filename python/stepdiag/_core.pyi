@@ -4294,9 +4294,9 @@ def uncertain_quantities() -> tuple[UncertainQuantity, ...]:
     """
     The set-up quantities, what lines share, and the noises.
     """
-def verify(calibration: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, **kwargs: typing.Any) -> Verification:
+def verify(calibration: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, sent: numpy.typing.ArrayLike | None = None, **kwargs: typing.Any) -> Verification:
     """
-    Predicts readings from a calibration that was made without them, with uncertainty, and judges the deviations. Plan, head and options (AdjustmentOptions, or its fields by name) are those of the readings. Raises InvalidArgument, also for a calibration without covariance, of another chain, volume or tool, or without all 21 parameters.
+    Predicts readings from a calibration that was made without them, with uncertainty, and judges the deviations. Plan, head and options (AdjustmentOptions, or its fields by name) are those of the readings. sent (n, 3), mm: where a table sent the motors less the commanded positions, by row of a run with a compensation in force. Raises InvalidArgument, also for a calibration without covariance, of another chain, volume or tool, or without all 21 parameters.
     """
 def volumetric_accuracy(calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, samples: typing.SupportsIndex = 10000, seed: typing.SupportsIndex = 0) -> VolumetricAccuracy:
     """

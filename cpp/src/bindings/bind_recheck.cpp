@@ -28,15 +28,24 @@ struct VerificationOfRun : Verification {
     }
 };
 
+MotorShifts to_shifts(const py::handle& array) {
+    const Points points = to_points(array, "sent");
+    MotorShifts shifts;
+    for (Eigen::Index i = 0; i < points.rows(); ++i) shifts.push_back(points.row(i).transpose());
+    return shifts;
+}
+
 VerificationOfRun verify_run(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
                              const HeadLike& head, const ChainLike& chain, const ArrayLike& tool,
-                             const std::optional<AdjustmentOptions>& given, const Fields& fields) {
+                             const std::optional<AdjustmentOptions>& given, const std::optional<ArrayLike>& sent,
+                             const Fields& fields) {
     const AdjustmentOptions options = options_of(given, fields);
+    const MotorShifts shifts = sent ? to_shifts(*sent) : MotorShifts{};
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
     const py::gil_scoped_release release;
-    return {verify(calibration, measurement, plan, kinematics, offset, heads, options), measurement.size()};
+    return {verify(calibration, measurement, plan, kinematics, offset, heads, options, shifts), measurement.size()};
 }
 
 Recheck recheck_run(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const HeadLike& head,
@@ -182,8 +191,11 @@ void bind_recheck(py::module_& m) {
 
     m.def("verify", &verify_run, py::arg("calibration"), py::arg("measurement"), py::arg("plan"), py::arg("head"),
           py::arg("chain"), py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
+          py::arg("sent") = std::nullopt,
           "Predicts readings from a calibration that was made without them, with uncertainty, and judges the "
           "deviations. Plan, head and options (AdjustmentOptions, or its fields by name) are those of the readings. "
+          "sent (n, 3), mm: where a table sent the motors less the commanded positions, by row of a run with a "
+          "compensation in force. "
           "Raises InvalidArgument, also for a calibration without covariance, of another chain, volume or tool, or "
           "without all 21 parameters.");
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stepdiag/core/error.hpp"
 
@@ -45,8 +46,8 @@ Baseline::Positions read_positions(const AdjustmentProblem& problem) {
     return read;
 }
 
-Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baseline)
-    : problem_(problem), baseline_(baseline), root_(baseline.root()) {
+Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baseline, MotorShifts sent)
+    : problem_(problem), baseline_(baseline), sent_(std::move(sent)), root_(baseline.root()) {
     weigh_readings();
     collect_rows();
     z_.setZero(baseline.root().cols() + Eigen::Index(problem.coefficients().size() + problem.sensors().size()));
@@ -157,6 +158,8 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             const double position = point.place.commanded[a];
             shares[a].clear();
             errors[a] = baseline_.errors(axis, position, point.negative[a], shares[a]);
+            if (!sent_.empty() && point.first_reading < point.end_reading)
+                errors[a][a] += sent_[problem_.readings()[point.first_reading].row][a];
             for (const Baseline::Share& share : shares[a])
                 errors[a][share.component] += share.weight * values[share.entry];
             added[a] = added_by_expansion(problem_, point, a, z.size() - columns);

@@ -9,6 +9,7 @@
 #include "adjustment/adjustment_problem.hpp"
 #include "evaluation/fit_test.hpp"
 #include "recheck/baseline.hpp"
+#include "stepdiag/recheck/verification.hpp"
 
 namespace stepdiag {
 
@@ -19,7 +20,8 @@ Baseline::Positions read_positions(const AdjustmentProblem& problem);
 // block of z, bordered by a small block of each set-up, which couple with it alone.
 class Prediction {
 public:
-    Prediction(const AdjustmentProblem& problem, const Baseline& baseline);
+    // `sent`: see verify().
+    Prediction(const AdjustmentProblem& problem, const Baseline& baseline, MotorShifts sent = {});
 
     // To the minimum of e^T e + z^T z + priors of s. Where that is not reached, as near as it gets: the square sum is
     // then larger than the minimum.
@@ -88,6 +90,7 @@ private:
 
     const AdjustmentProblem& problem_;
     const Baseline& baseline_;
+    MotorShifts sent_;
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root_;  // of the baseline
     std::vector<double> sigma_;                                                    // by reading
     int used_ = 0;                                                                 // readings; the others stay out

@@ -64,8 +64,8 @@ std::vector<LineDeviation> line_deviations(const Measurement& measurement, const
 }
 
 Judgement<Verification> verified(const Measurement& measurement, const AdjustmentProblem& problem,
-                                 const Baseline& baseline) {
-    Prediction prediction(problem, baseline);
+                                 const Baseline& baseline, const MotorShifts& sent) {
+    Prediction prediction(problem, baseline, sent);
     prediction.solve();
     prediction.drop_changes();
     const Eigen::Index own = baseline.own_columns(), changes = Eigen::Index(baseline.changes().size());
@@ -92,7 +92,7 @@ Judgement<Verification> verified(const Measurement& measurement, const Adjustmen
     if (is_asked) {
         constexpr std::size_t tried = 5;
         const Baseline changing(baseline.calibration(), ChangePriors{}, read_positions(problem));
-        Prediction changed(problem, changing);
+        Prediction changed(problem, changing, sent);
         changed.solve();
         misfits = largest_misfits(problem, changed, tried);
         square_sum = changed.chi_square();
@@ -104,14 +104,17 @@ Judgement<Verification> verified(const Measurement& measurement, const Adjustmen
 
 Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
                     const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
-                    const AdjustmentOptions& options) {
+                    const AdjustmentOptions& options, const MotorShifts& sent) {
+    if (!sent.empty() && sent.size() != measurement.size())
+        throw InvalidArgument("sent: expected a shift for each of " + std::to_string(measurement.size()) +
+                              " rows, got " + std::to_string(sent.size()));
     check_same_machine(calibration, plan, chain, tool, options);
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     const Baseline baseline(calibration, largest_change, read_positions(problem));
     return judge_without_wrong_readings(
         {measurement, plan, chain, tool, heads, options}, problem,
-        [&](const AdjustmentProblem& rest) { return verified(measurement, rest, baseline); });
+        [&](const AdjustmentProblem& rest) { return verified(measurement, rest, baseline, sent); });
 }
 
 }  // namespace stepdiag

@@ -281,9 +281,25 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
     metavar="P",
     help="Share of tests in which a right calibration may be refused.",
 )
+@click.option(
+    "--compensated",
+    "tables",
+    type=PATH,
+    multiple=True,
+    metavar="TABLE",
+    help="RUN was measured with this table of `export` in force; of Heidenhain's give each .com file.",
+)
 @json_option
 @click.pass_context
-def verify(context: click.Context, calibration: Path, scenario: Path, run: Path, alpha: float, as_json: bool) -> None:
+def verify(
+    context: click.Context,
+    calibration: Path,
+    scenario: Path,
+    run: Path,
+    alpha: float,
+    tables: tuple[Path, ...],
+    as_json: bool,
+) -> None:
     """Test a CALIBRATION (netCDF) with the readings of RUN, from which it was not made.
 
     SCENARIO has plan, head and uncertainties of RUN: other diagonals, a line once more, another
@@ -294,14 +310,18 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     Where the readings do not agree, those that the tests of `evaluate` find wrong are named and left
     out. If the rest does not agree, or readings were left out, the command ends with a warning and
     exit code 3.
+
+    With --compensated RUN is one of the compensated machine. It is also said whether the readings go
+    with the table, with none, or with one of the opposite sign.
     """
     from stepdiag.config.toml_text import located
     from stepdiag.findings.faults import fault_text
+    from stepdiag.importing.controller_tables import machine_of_tables
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
     from stepdiag.presentation.blocks import text_of
     from stepdiag.presentation.verification import agrees, verification_blocks
-    from stepdiag.rechecking.verification import check_other_run, verify
+    from stepdiag.rechecking.verification import check_other_run, verify, verify_compensated
     from stepdiag.scenario.description import read_scenario
 
     if not 0.0 < alpha < 1.0:
@@ -313,7 +333,11 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     check_other_run(tested, run)
     measurement = read_measurement(run)
     with located(f"{calibration}, {run}"), Progress("verify"):
-        verification = verify(tested, known, measurement)
+        if tables:
+            table = machine_of_tables(tables, tested)
+            verification, compensated = verify_compensated(tested, known, measurement, table)
+        else:
+            verification, compensated = verify(tested, known, measurement), None
     warnings = trust_warnings(calibration, tested)
     warnings += input_warnings(known, run, measurement)
     if not agrees(verification, alpha):
@@ -322,6 +346,10 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
             *warnings,
         ]
     warnings += [f"{run}: {fault_text(found)}" for found in verification.left_out]
+    if compensated is not None and compensated.is_in_force:
+        say(compensated.sentence(), err=as_json)
+    elif compensated is not None:
+        warnings = [f"{tables[0]}: {compensated.sentence()}", *warnings]
     if as_json:
         from stepdiag.presentation.objects.verification import verification_object
         from stepdiag.presentation.objects.writer import json_text

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Chain, ErrorMap, InvalidArgument, Machine
+from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine, read_error_map
 from stepdiag.findings.error_map import check_angles
 from stepdiag.io.whole_files import read_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
@@ -110,6 +110,31 @@ def read_controller_tables(
     text += [f"not in the file: {', '.join(lacking)}"] if lacking else []
     text.append("sign: values are taken as errors, actual - commanded; a table of corrections has the opposite sign")
     return ImportedMap(errors, Chain(named).name, (edges[0], edges[1], edges[2]), offset, text)
+
+
+def machine_of_tables(files: Sequence[Path], calibration: Calibration) -> Machine:
+    """A machine with the errors that these tables, made for the calibration, compensate; or with those of a file of it.
+
+    What files of others do not say of the machine is that of the calibration, with home at 0."""
+    if not all(is_controller_table(file) for file in files):
+        if len(files) != 1:
+            raise InvalidArgument(f"{files[0]}: expected one calibration, or tables of a controller")
+        return Machine(calibration.chain, read_error_map(files[0]), calibration.tool)
+    found = read_controller_tables(
+        files,
+        chain=calibration.chain.name,
+        volume=_three(calibration.volume),
+        tool=None if _says_tool(files) else _three(calibration.tool),
+    )
+    return Machine(found.chain, found.errors, found.tool)
+
+
+def _three(values: FloatArray) -> Triple:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _says_tool(files: Sequence[Path]) -> bool:
+    return "tool" in _said("\n".join(read_text(file) for file in files))
 
 
 def _said(text: str) -> Mapping[str, str]:

@@ -1,11 +1,14 @@
 """Readings against a calibration that was made without them."""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy.typing as npt
+
 from stepdiag import _core
-from stepdiag._core import Calibration, InvalidArgument, Measurement, Verification
+from stepdiag._core import Calibration, InvalidArgument, Machine, Measurement, Verification
 from stepdiag.io.whole_files import read_bytes
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
@@ -17,7 +20,13 @@ ALPHA: Final = 0.001
 
 
 @checked
-def verify(calibration: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Verification:
+def verify(
+    calibration: Calibration,
+    scenario: Scenario | Known,
+    measurement: Measurement,
+    *,
+    sent: npt.ArrayLike | None = None,
+) -> Verification:
     """Predict the readings of a scenario's run from a calibration, and judge the deviations.
 
     How head and mirror stood is estimated from the readings, with the priors of `[adjustment]`; the
@@ -28,6 +37,9 @@ def verify(calibration: Calibration, scenario: Scenario | Known, measurement: Me
             chain, volume and tool. It must not be made from these readings.
         scenario: plan, head, uncertainties and `[temperature]` of the readings.
         measurement: the readings.
+        sent: (n, 3), mm: of a run with a compensation in force, by row of the measurement, where its table sent
+            the motors less the commanded position. The errors are taken at the commanded positions, from which
+            they differ by a shift times a slope.
 
     Raises:
         InvalidArgument: the calibration cannot predict these readings, or they do not fit the plan.
@@ -41,7 +53,49 @@ def verify(calibration: Calibration, scenario: Scenario | Known, measurement: Me
         known.chain,
         known.tool,
         adjustment_options(known),
+        sent=sent,
     )
+
+
+@dataclass(frozen=True)
+class Compensated:
+    """Chi-square of a run by a calibration, with a table in force as it is, without it, and with its sign turned."""
+
+    with_it: float
+    without: float
+    turned: float
+    degrees_of_freedom: int
+
+    def sentence(self) -> str:
+        figures = (
+            f"chi-square with the table {self.with_it:.5g}, without it {self.without:.5g}, with its sign turned "
+            f"{self.turned:.5g}, {self.degrees_of_freedom} degrees of freedom"
+        )
+        return f"{figures}: {self.verdict}"
+
+    @property
+    def is_in_force(self) -> bool:
+        return self.with_it <= min(self.without, self.turned)
+
+    @property
+    def verdict(self) -> str:
+        if self.is_in_force:
+            return "the table is in force, with the right sign"
+        if self.without <= self.turned:
+            return "the readings are those of the machine without the table"
+        return "the table acts with the wrong sign: take it away"
+
+
+def verify_compensated(
+    calibration: Calibration, scenario: Scenario | Known, measurement: Measurement, table: Machine
+) -> tuple[Verification, Compensated]:
+    """Verify with a run that was measured with a table in force.
+
+    `table`: a machine that has the errors of the table, which a controller subtracts at the commanded position."""
+    shift = -table.first_order_error(measurement.position)
+    found = [verify(calibration, scenario, measurement, sent=factor * shift) for factor in (1.0, 0.0, -1.0)]
+    sizes = [one.chi_square for one in found]
+    return found[0], Compensated(sizes[0], sizes[1], sizes[2], found[0].degrees_of_freedom)
 
 
 def with_stated_between_nodes(calibration: Calibration, known: Known) -> Calibration:

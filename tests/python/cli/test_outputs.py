@@ -97,7 +97,7 @@ INPUTS = {
         ("study", "file"),
     },
     *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
-    *{("import", "files"), ("import", "scenario"), ("evaluate", "run")},
+    *{("import", "files"), ("import", "scenario"), ("evaluate", "run"), ("verify", "tables")},
     *{("compare", "a"), ("compare", "b"), ("positions", "file")},
     *{("verify", name) for name in ("calibration", "scenario", "run")},
     *{("recheck", name) for name in ("baseline", "scenario", "run")},

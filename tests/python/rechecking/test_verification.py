@@ -7,62 +7,10 @@ import pytest
 from calibrations import parts_of
 from json_objects import printed
 from refusal import refused
+from verified import TESTED
 
 import stepdiag as sd
 from stepdiag.cli import main
-
-MACHINE = """
-[volume]
-x_mm = 400.0
-y_mm = 300.0
-z_mm = 250.0
-
-[machine]
-chain = "[w X' b Y Z t]"
-
-[machine.random]
-seed = 5
-intervals = 6
-
-[head]
-layout = "ideal"
-
-[noise]
-distance_um = 0.2
-tilt_urad = 1.0
-seed = {seed}
-
-[uncertainty]
-distance_um = 0.2
-tilt_urad = 1.0
-
-[adjustment]
-lateral_mm = "fixed"
-roll_urad = "fixed"
-gain = "fixed"
-"""
-CALIBRATED = (
-    MACHINE.format(seed=1)
-    + """
-[plan]
-lines = ["ppp", "npp", "pnp", "nnp"]
-steps = 6
-scale_lines = ["p00", "0p0", "00p"]
-"""
-)
-TESTED = MACHINE.format(seed=2) + '[plan]\nlines = ["ppp", "nnp"]\nsteps = 3\n'
-
-
-@pytest.fixture
-def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A calibration, and a run of two of its lines in larger steps."""
-    monkeypatch.chdir(tmp_path)
-    Path("calibrated.toml").write_text(CALIBRATED)
-    Path("tested.toml").write_text(TESTED)
-    assert main(["simulate", "calibrated.toml", "-o", "run.csv"]) == 0
-    assert main(["evaluate", "calibrated.toml", "run.csv", "-o", "calibration.nc"]) == 0
-    assert main(["simulate", "tested.toml", "-o", "new.csv"]) == 0
-    return tmp_path
 
 
 def test_new_readings_of_the_same_machine_agree(files: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@
 // right.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -56,13 +57,17 @@ struct Verification {
     std::vector<FaultClass> left_out = {};
 };
 
+// By row of a measurement: where a controller's table sent the motors, less the commanded position, mm.
+using MotorShifts = std::vector<Eigen::Vector3d>;
+
 // `plan`, `heads` and `options` are those of the readings. Of `options` count: the uncertainties of readings and of
 // set-ups, one_setup_per_line, and the expansion of the scales with its uncertainties, which is needed where the
 // calibration is referred to a temperature. Throws InvalidArgument as adjust() does; for a calibration without
 // covariance, or of another chain, volume or tool; for one that does not determine all 21 parameters; for readings that
-// do not tell how head and mirror stood.
+// do not tell how head and mirror stood. `sent`, of a run with a compensation in force: the axes stand there; their errors
+// are those at the commanded positions, from which they differ by a shift times a slope. Empty: as commanded.
 Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
                     const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
-                    const AdjustmentOptions& options = {});
+                    const AdjustmentOptions& options = {}, const MotorShifts& sent = {});
 
 }  // namespace stepdiag
