@@ -64,8 +64,8 @@ using MotorShifts = std::vector<Eigen::Vector3d>;
 // set-ups, one_setup_per_line, and the expansion of the scales with its uncertainties, which is needed where the
 // calibration is referred to a temperature. Throws InvalidArgument as adjust() does; for a calibration without
 // covariance, or of another chain, volume or tool; for one that does not determine all 21 parameters; for readings that
-// do not tell how head and mirror stood. `sent`, of a run with a compensation in force: the axes stand there; their errors
-// are those at the commanded positions, from which they differ by a shift times a slope. Empty: as commanded.
+// do not tell how head and mirror stood. `sent`, of a run with a compensation in force: the axes stand there; their
+// errors are those at the commanded positions, from which they differ by a shift times a slope. Empty: as commanded.
 Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
                     const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                     const AdjustmentOptions& options = {}, const MotorShifts& sent = {});
