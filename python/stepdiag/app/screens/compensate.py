@@ -65,7 +65,6 @@ def _form(machine: MachineFolder, entry: Entry) -> Markup:
     kept = [element("option", "choose …", value="")]
     kept += [element("option", "the controller has no table", value=NONE)]
     kept += [element("option", f"{one.file} ({one.date[:10]})", value=one.file) for one in reversed(tables)]
-    formats = [element("option", f"{one.controllers}: {one.what} – {key}", value=key) for key, one in FORMATS.items()]
     axes = [element("option", axis, value=axis) for axis in "XYZ"]
     return section(
         "table",
@@ -73,7 +72,7 @@ def _form(machine: MachineFolder, entry: Entry) -> Markup:
         element(
             "form",
             _field("replaces", "It replaces", element("select", *kept, id="replaces", name="replaces", required=True)),
-            _field("to", "Controller", element("select", *formats, id="to", name="to")),
+            _field("to", "Controller", element("select", *_formats(), id="to", name="to")),
             _field(
                 "at",
                 "Lines through X Y Z, mm (tables of one axis)",
@@ -99,7 +98,33 @@ def _form(machine: MachineFolder, entry: Entry) -> Markup:
             class_="fields",
         ),
         element("p", "The next page says what remains in the volume.", class_="quiet"),
+        element(
+            "details",
+            element("summary", "Which table for which controller, and how each was tested"),
+            table(
+                "What remains of yours is said when the table is made",
+                ("Controller", "Format", "What it holds", "How it was tested"),
+                [(one.controllers, key, one.what, one.tested) for key, one in FORMATS.items()],
+            ),
+        ),
     )
+
+
+def _formats() -> list[Markup]:
+    """Options, in a group for each kind of controller."""
+    groups = dict.fromkeys(one.controllers for one in FORMATS.values())
+    return [
+        element(
+            "optgroup",
+            *(
+                element("option", f"{one.what} – {key}", value=key)
+                for key, one in FORMATS.items()
+                if one.controllers == group
+            ),
+            label=group,
+        )
+        for group in groups
+    ]
 
 
 def _made(machine: MachineFolder) -> Markup | None:
