@@ -21,14 +21,21 @@ PACKAGE: Final = Path(__file__).parents[2] / "python" / "stepdiag"
 MODULES: Final = (
     "units.py",
     "importing/columns.py",
+    "importing/controller_tables.py",
     "importing/numbers.py",
+    "exporting/axis_tables.py",
     "exporting/common.py",
     "exporting/csv_grid.py",
+    "exporting/etalon.py",
+    "exporting/firmware.py",
+    "exporting/heidenhain.py",
     "exporting/isg.py",
     "exporting/linuxcnc_comp.py",
     "exporting/linuxcnc_kins.py",
     "exporting/polynomial.py",
     "exporting/position_error.py",
+    "exporting/siemens.py",
+    "exporting/tool_side.py",
     "positions/readings.py",
 )
 # Functions that report, or choose nodes: of these each choice is right that is close enough.
@@ -51,8 +58,9 @@ NO_RESULTS: Final = (
 )
 WAYS: Final = """
 from stepdiag.selftest.cases import KNOWN
+from stepdiag.selftest.controllers import controllers
 from stepdiag.selftest.ways import exports, files, units
-rows = [row for case in (units, files, exports) for row in case(KNOWN)]
+rows = [row for case in (units, files, exports, controllers) for row in case(KNOWN)]
 raise SystemExit(0 if all(row.passed for row in rows) else 3)
 """
 # What may stay unseen: module, part of the change, and why (docs/selftest.md).
@@ -61,10 +69,10 @@ ALLOWED: Final = {
     ("exporting/common.py", "1e-06 is"): "a tolerance",
     ("exporting/csv_grid.py", "1e-12 is"): "a tolerance",
     ("exporting/csv_grid.py", "1.0 is 1.01"): "a tolerance",
-    ("exporting/isg.py", "1e-05 is"): "a tolerance",
+    ("exporting/tool_side.py", "1e-05 is"): "a tolerance",
     ("exporting/isg.py", "sum((len"): "number of records, in a comment",
-    ("exporting/isg.py", "0.0 is 1.0"): "a place where nothing acts",
-    ("exporting/isg.py", "3.0 is"): "a weight between nodes that are left out",
+    ("exporting/tool_side.py", "0.0 is 1.0"): "a place where nothing acts",
+    ("exporting/tool_side.py", "3.0 is"): "a weight between nodes that are left out",
     ("exporting/polynomial.py", "1e-09 is"): "a tolerance",
     ("exporting/polynomial.py", "inverse @ origin"): "displacement of home, in a comment",
     ("exporting/position_error.py", "0.5 is"): "the stated loss of left out nodes",

@@ -124,13 +124,13 @@ def units(_: Path) -> Iterator[SelfTestRow]:
     off = [UNITS[key].native / factor - 1.0 if key in UNITS else np.nan for key, factor in KEYS.items()]
     off += [0.0 if set(UNITS) == set(KEYS) and unit_of("number").native == 1.0 else np.nan]
     off += [constant / value - 1.0 for constant, value in CONSTANTS]
-    yield SelfTestRow("units", f"of keys, {len(KEYS)}", DEFINED, _largest(off), ROUNDING)
+    yield SelfTestRow("units", f"of keys, {len(KEYS)}", DEFINED, largest(off), ROUNDING)
     shown = [report_value(unit, 2.5) for unit in REPORTED]
     off = [
         value / want - 1.0 if name == word else np.nan
         for (value, name), (want, word) in zip(shown, REPORTED.values(), strict=True)
     ]
-    yield SelfTestRow("units", f"of reports, {len(off)}", DEFINED, _largest(off), ROUNDING)
+    yield SelfTestRow("units", f"of reports, {len(off)}", DEFINED, largest(off), ROUNDING)
     with tempfile.TemporaryDirectory() as folder:
         for channel, words in SHEETS.items():
             off = []
@@ -139,11 +139,11 @@ def units(_: Path) -> Iterator[SelfTestRow]:
                     off.append(_imported(Path(folder), channel, word, sign) / (sign * expected) - 1.0)
                 if channel not in ("distance", "alpha"):  # only readings have a sign
                     off.pop()
-            yield SelfTestRow("import", f"{channel}, {len(words)} units", DEFINED, _largest(off), ROUNDING)
+            yield SelfTestRow("import", f"{channel}, {len(words)} units", DEFINED, largest(off), ROUNDING)
     off = [float(seconds) - CLOCKS[text] for text in CLOCKS for _, seconds in [clock(text) or (0, np.nan)]]
-    yield SelfTestRow("import", f"clock times, {len(CLOCKS)}", BY_HAND, _largest(off), 0.0)
+    yield SelfTestRow("import", f"clock times, {len(CLOCKS)}", BY_HAND, largest(off), 0.0)
     off = [float(shown_by(code) != shown) for code, shown in FORMATS.items()]
-    yield SelfTestRow("import", f"number formats, {len(FORMATS)}", BY_HAND, _largest(off), 0.0)
+    yield SelfTestRow("import", f"number formats, {len(FORMATS)}", BY_HAND, largest(off), 0.0)
 
 
 def _imported(folder: Path, channel: str, unit: str, sign: int) -> float:
@@ -167,7 +167,7 @@ def _imported(folder: Path, channel: str, unit: str, sign: int) -> float:
 
 def exports(_: Path) -> Iterator[SelfTestRow]:
     """Each format, written and read by its own rules, beside numbers worked out by hand."""
-    bent, square = _machine(ERRORS), _machine({})
+    bent, square = known_machine(ERRORS), known_machine({})
     place, error = AT_POINT
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -192,7 +192,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             for x, e in ((0.0, 0.0), (100.0, a), (200.0, b))
             for one in actual[j, HOME[j] + x]
         ]
-        yield SelfTestRow("export", "linuxcnc-comp", BY_HAND, _largest(off), SECOND_ORDER, "mm")
+        yield SelfTestRow("export", "linuxcnc-comp", BY_HAND, largest(off), SECOND_ORDER, "mm")
 
         text = written("linuxcnc-kins", bent)
         back = read_calibration(folder / "linuxcnc-kins.csv")
@@ -202,7 +202,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             for k, value in ((1, both[0]), (2, both[1]))
         ]
         off += [back.squareness[name][0] - value for name, value in SQUARE.items()]
-        yield SelfTestRow("export", "linuxcnc-kins", BY_HAND, _largest(off if "EXX" in text else []), 1e-17)
+        yield SelfTestRow("export", "linuxcnc-kins", BY_HAND, largest(off if "EXX" in text else []), 1e-17)
 
         table = _isg(written("isg", bent, origin=HOME))
         # The controller takes Y for the lever of ECX, and home is at -3 mm there.
@@ -217,7 +217,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             for key, row in expected_isg.items()
             for a, b in zip(table.get((key[0], key[1] + HOME["XYZ".index(key[0])]), [np.nan] * 6), row, strict=True)
         ]
-        yield SelfTestRow("export", "isg", BY_HAND, _largest(off), 1e-9)
+        yield SelfTestRow("export", "isg", BY_HAND, largest(off), 1e-9)
         # With its own squarenesses, which turn about the controller's 0: EXY = C0Y y0, EXZ = -B0Z z0, EYZ = A0Z z0.
         table = _isg(written("isg", bent, origin=HOME, squareness="parameters"))
         expected_isg = {
@@ -230,7 +230,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             for (axis, at), row in expected_isg.items()
             for a, b in zip(table.get((axis, at + HOME["XYZ".index(axis)]), [np.nan] * 6), row, strict=True)
         ]
-        yield SelfTestRow("export", "isg, squareness apart", BY_HAND, _largest(off), 1e-9)
+        yield SelfTestRow("export", "isg, squareness apart", BY_HAND, largest(off), 1e-9)
 
         grid = _csv(written("csv-grid", bent, step=100.0, origin=HOME))
         row = next(
@@ -241,9 +241,9 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             if row is None
             else [1e-3 * (float(row[f"e{a}_um"]) - want) for a, want in zip("xyz", error, strict=True)]
         )
-        yield SelfTestRow("export", "csv-grid", BY_HAND, _largest(off), SECOND_ORDER, "mm")
+        yield SelfTestRow("export", "csv-grid", BY_HAND, largest(off), SECOND_ORDER, "mm")
 
-        turned = _machine({"EAX": (10.0, 40.0), "EBX": (20.0, 50.0), "ECX": (30.0, 60.0)})
+        turned = known_machine({"EAX": (10.0, 40.0), "EBX": (20.0, 50.0), "ECX": (30.0, 60.0)})
         grid = _csv(written("csv-grid", turned, step=100.0, orientation=True))
         row = next((row for row in grid if tuple(float(row[f"{a}_mm"]) for a in "xyz") == place), None)
         off = (
@@ -252,7 +252,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             else [1e-6 * (float(row[f"e{a}_urad"]) - want) for a, want in zip("abc", (40.0, 50.0, 60.0), strict=True)]
         )
         # Squarenesses turn no tool. Rotations of 60 µrad do not commute by 2 nrad.
-        yield SelfTestRow("export", "csv-grid, rotations", BY_HAND, _largest(off), 2e-9, "rad")
+        yield SelfTestRow("export", "csv-grid, rotations", BY_HAND, largest(off), 2e-9, "rad")
 
         angles = {row["parameter"]: row for row in _csv(written("squareness", square))}
         larger = {"C0Y": 50.0, "B0Z": 30.0, "A0Z": 20.0}  # each of them opens the angle of its axes
@@ -262,7 +262,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
         off += [float(angles[name]["value_arcsec"]) - value for name, value in arcsec.items()]
         off += [float(angles[name]["fitted_urad"]) - 1e6 * value for name, value in SQUARE.items()]
         off += [float(angles[name]["larger_than_90_urad"]) - value for name, value in larger.items()]
-        yield SelfTestRow("export", "squareness", BY_HAND, _largest(off), 1e-11)
+        yield SelfTestRow("export", "squareness", BY_HAND, largest(off), 1e-11)
 
         # The inverse of (1, -C0Y, B0Z; 0, 1, -A0Z; 0, 0, 1), and this matrix itself.
         pins = _pins(written("matrix", square))
@@ -278,7 +278,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             "C_zy": 0.0,
         }
         yield SelfTestRow(
-            "export", "matrix", BY_HAND, _largest([pins.get(k, np.nan) - v for k, v in wanted.items()]), LINES
+            "export", "matrix", BY_HAND, largest([pins.get(k, np.nan) - v for k, v in wanted.items()]), LINES
         )
         pins = _pins(written("calibxyzkins", square))
         wanted = {
@@ -290,20 +290,20 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             "calib-a.yz": -20e-6,
         }
         yield SelfTestRow(
-            "export", "calibxyzkins", BY_HAND, _largest([pins.get(k, np.nan) - v for k, v in wanted.items()]), LINES
+            "export", "calibxyzkins", BY_HAND, largest([pins.get(k, np.nan) - v for k, v in wanted.items()]), LINES
         )
 
         # EXX = s x + k x^2 of x = m - h, and X - h = x + EXX.
         k, s, h = PARABOLA, SLOPE, HOME[0]
-        pins = _pins(written("calibxyzkins", _machine({}, {}, parabola=k), origin=HOME))
+        pins = _pins(written("calibxyzkins", known_machine({}, {}, parabola=k), origin=HOME))
         wanted = {"calib-a.xx": 1.0 + s - 2.0 * k * h, "calib-b.xx": k, "calib-c.x": k * h**2 - s * h}
         off = [pins.get(name, np.nan) - value for name, value in wanted.items()]
-        yield SelfTestRow("export", "calibxyzkins, parabola", BY_HAND, _largest(off), 1e-9)
+        yield SelfTestRow("export", "calibxyzkins, parabola", BY_HAND, largest(off), 1e-9)
 
         # One table for both directions has their mean: EYY less half of what + has more than -.
-        table = _isg(written("isg", _machine(ERRORS, reversal={"EYY": 3.0}), origin=HOME))
+        table = _isg(written("isg", known_machine(ERRORS, reversal={"EYY": 3.0}), origin=HOME))
         off = [table.get(("Y", 100.0 + HOME[1]), [np.nan] * 6)[1] - (-4e-3 - 1.5e-3)]
-        yield SelfTestRow("export", "isg, mean of two directions", BY_HAND, _largest(off), 1e-9, "mm")
+        yield SelfTestRow("export", "isg, mean of two directions", BY_HAND, largest(off), 1e-9, "mm")
 
         positions = {
             float(row["position_mm"]): float(row["error_um"])
@@ -313,7 +313,7 @@ def exports(_: Path) -> Iterator[SelfTestRow]:
             1e-3 * (positions.get(HOME[0] + at, np.nan) - want)
             for at, want in ((0.0, 0.0), (100.0, 8.0), (200.0, 13.0))
         ]
-        yield SelfTestRow("export", "position-error", BY_HAND, _largest(off), SECOND_ORDER, "mm")
+        yield SelfTestRow("export", "position-error", BY_HAND, largest(off), SECOND_ORDER, "mm")
 
 
 def files(_: Path) -> Iterator[SelfTestRow]:
@@ -335,7 +335,7 @@ def files(_: Path) -> Iterator[SelfTestRow]:
             "air_humidity": 0.025,
         }
         off = [float(found[channel][1]) / value - 1.0 for channel, value in expected.items()]
-        yield SelfTestRow("files", "columns of a run", BY_HAND, _largest(off), ROUNDING)
+        yield SelfTestRow("files", "columns of a run", BY_HAND, largest(off), ROUNDING)
         tested = Path(name) / "positions.csv"
         tested.write_text("target_mm,direction,cycle,deviation_um\n0,+,1,2.5\n100,-,1,-2.5\n", encoding="utf-8")
         deviations = read_positions(tested).deviations
@@ -348,10 +348,10 @@ def files(_: Path) -> Iterator[SelfTestRow]:
         )
         found_targets = read_positions(tested)
         off += [found_targets.lost - 1.0, found_targets.apart / 0.25 - 1.0, found_targets.targets[-1] / 100.0 - 1.0]
-        yield SelfTestRow("files", "columns of a positioning test", BY_HAND, _largest(off), ROUNDING)
+        yield SelfTestRow("files", "columns of a positioning test", BY_HAND, largest(off), ROUNDING)
 
 
-def _machine(
+def known_machine(
     errors: Mapping[str, tuple[float, float]],
     squareness: Mapping[str, float] = SQUARE,
     reversal: Mapping[str, float] = MappingProxyType({}),
@@ -402,7 +402,7 @@ def _pins(text: str) -> dict[str, float]:
     return {name: float(value) for name, value in re.findall(r"(?m)^setp \w+\.(\S+) (\S+)$", text)}
 
 
-def _largest(values: Sequence[float]) -> float:
+def largest(values: Sequence[float]) -> float:
     """NaN where there are none, or one is NaN: that passes nothing."""
     sizes = np.abs(np.asarray(values, dtype=float))
     return float(sizes.max()) if sizes.size else float("nan")
