@@ -59,6 +59,13 @@ class AxisTables:
         """The number of tables: those of both directions count twice."""
         return sum(len(values) for values in self.functions.values())
 
+    @property
+    def directions(self) -> str:
+        """In words; empty: as the options say."""
+        two = [f"{AXES[axis]} by {AXES[by]}" for (axis, by), values in self.functions.items() if len(values) == 2]
+        rest = " (mean of both for the others)" if two and len(two) < len(self.functions) else ""
+        return f"each by itself: {', '.join(two)}{rest}" if two else ""
+
     def motors(self, commanded: FloatArray, direction: int) -> FloatArray:
         """Where a controller sends the motors that subtracts the tables, interpolated linearly and held at the ends."""
         sent = commanded.copy()

@@ -49,7 +49,7 @@ def heidenhain_com(calibration: Calibration, output: Path, options: ExportOption
     origin = origin_of(options)
     lines = [
         UNTRIED.format("MANUALplus 620"),
-        *heading(calibration, options),
+        *heading(calibration, options, directions=tables.directions),
         "units: mm, positions from the machine datum; the axes have the keys X, Y, Z",
         *tables.sentences(),
         SIGN,

@@ -65,9 +65,13 @@ class Export:
         return [*self.report, *(f"wrote {path}" for path in self.files)]
 
 
-def heading(calibration: Calibration, options: ExportOptions, *, approach: bool = True) -> list[str]:
-    """Sentences that every export begins with. `approach`: whether it takes one direction of approach."""
-    direction = f", direction of approach {APPROACH_WORDS[options.approach or 'mean']}" if approach else ""
+def heading(
+    calibration: Calibration, options: ExportOptions, *, approach: bool = True, directions: str = ""
+) -> list[str]:
+    """Sentences that every export begins with. `approach`: whether it says a direction of approach, which is that of
+    the options unless `directions` has it in words."""
+    said = directions or APPROACH_WORDS[options.approach or "mean"]
+    direction = f", direction of approach {said}" if approach else ""
     return [
         *trust_rows(calibration),
         temperature_row(calibration),

@@ -126,7 +126,7 @@ def _range(positions: FloatArray, origin: float) -> tuple[str, str, str]:
 def _head(calibration: Calibration, options: ExportOptions, tables: AxisTables, names: Sequence[str]) -> list[str]:
     return [
         UNTRIED,
-        *heading(calibration, options),
+        *heading(calibration, options, directions=tables.directions),
         "units: mm, positions in the machine coordinate system; machine axes X, Y, Z: " + ", ".join(names),
         *tables.sentences(),
         SIGN,

@@ -29,6 +29,16 @@ SECOND_ORDER = 2e-5  # mm: an error of 0.1 mm times a rotation of 60 µrad, and 
 FIRST_ORDER = 5e-4  # mm: an error of 0.06 mm times a slope of 5 mm/m in such a small volume
 
 
+def test_directions_are_said(tmp_path: Path) -> None:
+    calibration = random_calibration(3, reversal=True)
+    said = [write_export(calibration, to, tmp_path / to, ExportOptions()).report for to in BOTH]
+    assert any("direction of approach each by itself: X by X, X by Y, X by Z, Y by X" in line for line in said[0])
+    own = "direction of approach each by itself: X by X, Y by Y, Z by Z (mean of both for the others)"
+    assert any(own in line for line in said[1])
+    one = write_export(calibration, "siemens-cec", tmp_path / "one", ExportOptions(approach="positive")).report
+    assert any("direction of approach +" in line for line in one)
+
+
 @pytest.mark.parametrize("chain", ALL_CHAINS)
 @pytest.mark.parametrize("to", INTERPRETERS)
 def test_what_is_left_is_what_the_export_says(tmp_path: Path, to: str, chain: str) -> None:
