@@ -17,7 +17,7 @@ from stepdiag._core import Environment, InvalidArgument, StatisticsOptions
 from stepdiag.calibration.largest_by_kind import largest_deviations
 from stepdiag.head.description import find_shipped_head, parse_head_design
 from stepdiag.scenario.description import Scenario, adjust_scenario, evaluate_scenario, read_scenario
-from stepdiag.selftest.controllers import controllers
+from stepdiag.selftest.controllers import controllers, tables_read_back
 from stepdiag.selftest.jcgm import UNIFORM, B, gauge_block, straight_line, sum_of_four
 from stepdiag.selftest.table import SelfTest, SelfTestRow, this_installation
 from stepdiag.selftest.ways import exports, files, units
@@ -264,6 +264,7 @@ CASES: Final[tuple[Callable[[Path], Iterator[SelfTestRow]], ...]] = (
     files,
     exports,
     controllers,
+    tables_read_back,
 )
 
 

@@ -9,11 +9,28 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag._core import Calibration, ErrorMap
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.write import write_export
 from stepdiag.importing.controller_tables import read_controller_tables
 from stepdiag.selftest.table import SelfTestRow
-from stepdiag.selftest.ways import BY_HAND, EDGE, ERRORS, HOME, known_machine, largest
+from stepdiag.selftest.ways import (
+    BY_HAND,
+    EDGE,
+    ERRORS,
+    HOME,
+    PARABOLA,
+    SECOND_ORDER,
+    SLOPE,
+    SQUARE,
+    known_machine,
+    largest,
+)
+
+FloatArray = npt.NDArray[np.float64]
 
 MIDDLE: Final = (0.5 * EDGE,) * 3
 DIGITS: Final = 6e-7  # mm: half of the sixth, and terms of second order
@@ -75,8 +92,7 @@ def controllers(_: Path) -> Iterator[SelfTestRow]:
         off = [d for row, want in zip(rows[1:], expected, strict=True) for d in _differences(row[2:], want)]
         yield SelfTestRow("export", "heidenhain-kinematics", BY_HAND, largest(off), DIGITS)
 
-        file = written("etalon", origin=HOME)
-        text = file.read_text(encoding="ascii")
+        text = written("etalon", origin=HOME).read_text(encoding="ascii")
         off = [
             difference
             for name, want in {"EXX": (0.0, 10e-3 - 6e-5, 16e-3 - 9e-5), "ECX": (0.0, 20e-6, 30e-6)}.items()
@@ -85,18 +101,6 @@ def controllers(_: Path) -> Iterator[SelfTestRow]:
             )
         ]
         yield SelfTestRow("export", "etalon", BY_HAND, largest(off), 1e-9)
-
-        back = read_controller_tables([file])
-        off = [
-            float(back.errors.functions[name][1][k]) - value * (1e-3 if name[1] in "XYZ" else 1e-6)
-            for name, both in ERRORS.items()
-            for k, value in ((1, both[0]), (2, both[1]))
-        ]
-        off += [
-            abs(back.errors.squareness[name]) - OBTUSE[axes]
-            for name, axes in (("C0Y", "XY"), ("B0Z", "XZ"), ("A0Z", "YZ"))
-        ]
-        yield SelfTestRow("import", "error map of etalon", BY_HAND, largest(off), 1e-8)
 
         # In the order of the words: M556 has X for XY, Y for YZ, Z for XZ; M852 I J K for XY XZ YZ, with the minus.
         values = _found(r"M556 S100 X(\S+) Y(\S+) Z(\S+)", written("rrf").read_text(encoding="ascii"))
@@ -109,6 +113,80 @@ def controllers(_: Path) -> Iterator[SelfTestRow]:
             ac, bd, ad = _found(rf"{axes}=([\d.]+),([\d.]+),([\d.]+)", text)
             off.append((bd**2 - ac**2) / (4.0 * ad**2) - tangent)
         yield SelfTestRow("export", "rrf, marlin, klipper", BY_HAND, largest(off), 6e-9)
+
+
+# What comes back of a table, at half of the edge and the edge, mm and rad, and the squarenesses, rad. On lines through
+# the middle C0Y and ECX there are one. Of reversal -: 3 µm less than +, at 0 too.
+LINES: Final = {"EXX": (8e-3, 13e-3), "EYY": (-4e-3, 6e-3), "EZZ": (3e-3, 9e-3), "EYX": (2e-3, 0.0), "EXY": (0.0, 0.0)}
+WHOLE: Final = {"EXX": (10e-3, 16e-3), "EYX": (2e-3, 0.0), "EYY": (-4e-3, 6e-3), "ECX": (20e-6, 30e-6)}
+POSITIONING: Final = {name: LINES[name] for name in ("EXX", "EYY", "EZZ")}
+SQUARE_IN_THE_MIDDLE: Final = SQUARE | {"C0Y": 70e-6}
+Expected = Mapping[str, tuple[float, float]]
+BACK: Final[Sequence[tuple[str, Mapping[str, object], Expected, Mapping[str, float]]]] = (
+    ("siemens-cec", {"at": MIDDLE}, LINES, SQUARE_IN_THE_MIDDLE),
+    ("siemens-enc-comp", {"at": MIDDLE}, POSITIONING, {}),
+    ("heidenhain-com", {"at": MIDDLE}, LINES, SQUARE_IN_THE_MIDDLE),
+    ("heidenhain-kinematics", {}, WHOLE, SQUARE),
+    ("linuxcnc-comp", {}, POSITIONING, {}),
+    ("isg", {"squareness": "parameters"}, WHOLE, SQUARE),
+    ("etalon", {}, WHOLE, SQUARE),
+    ("etalon", {"squareness": "parameters"}, WHOLE, SQUARE),
+    ("squareness", {}, {}, SQUARE),
+    ("position-error", {"axis": "X", "depends_on": "X"}, {"EXX": LINES["EXX"]}, {}),
+)
+
+
+def tables_read_back(_: Path) -> Iterator[SelfTestRow]:
+    """What is exported comes back as an error map."""
+    bent, square = known_machine(ERRORS), known_machine({})
+    two = known_machine(ERRORS, reversal={"EYY": 3.0})
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+
+        def back(machine: Calibration, to: str, **options: object) -> ErrorMap:
+            write_export(machine, to, folder / to, ExportOptions(**options))  # type: ignore[arg-type]
+            files = [folder / to]
+            if to.startswith("heidenhain"):
+                files = [folder / to / f"{axis}.com" for axis in "xyz"]
+            elif to == "linuxcnc-comp":
+                files = [folder / to / "compensation.ini"]
+            said = {"origin": HOME, "volume": (EDGE,) * 3} if to.startswith("heidenhain") else {}
+            return read_controller_tables(files, chain="[w b X Y Z t]", **said).errors
+
+        for to, options, functions, angles in BACK:
+            found = back(bent, to, origin=HOME, **options)
+            off = [d for name, want in functions.items() for d in _at_nodes(found.functions, name, want)]
+            off += [EDGE * (found.squareness[name] - want) for name, want in angles.items()]
+            apart = ", squareness apart" if "squareness" in options else ""
+            yield SelfTestRow("import", f"map of {to}{apart}", BY_HAND, largest(off), SECOND_ORDER, "mm")
+
+        off = []
+        for to in ("siemens-cec", "linuxcnc-comp", "heidenhain-com"):
+            found = back(two, to, origin=HOME, at=MIDDLE)
+            off += _at_nodes(found.negative_functions, "EYY", (-7e-3, 3e-3))
+            off.append(float(found.negative_functions["EYY"][1][0]) + 3e-3)
+        yield SelfTestRow("import", "maps of two directions", BY_HAND, largest(off), SECOND_ORDER, "mm")
+
+        off = [
+            found.squareness[name] - want
+            for to in ("rrf", "marlin", "klipper", "matrix")
+            for found in [back(square, to)]
+            for name, want in SQUARE.items()
+        ]
+        yield SelfTestRow("import", "maps of commands and a matrix", BY_HAND, largest(off), 6e-9, "rad")
+
+        found = back(known_machine({}, {}, parabola=PARABOLA), "calibxyzkins", origin=HOME)
+        want = tuple(SLOPE * x + PARABOLA * x**2 for x in (0.5 * EDGE, EDGE))
+        off = _at_nodes(found.functions, "EXX", (want[0], want[1]))
+        yield SelfTestRow("import", "map of a polynomial", BY_HAND, largest(off), 1e-8, "mm")
+
+
+def _at_nodes(tables: Mapping[str, tuple[FloatArray, FloatArray]], name: str, want: tuple[float, float]) -> list[float]:
+    """Differences, mm; of rotations what they do over the edge."""
+    position, value = tables[name]
+    arm = EDGE if name[1] in "ABC" else 1.0
+    places = zip((0.5 * EDGE, EDGE), want, strict=True)
+    return [arm * (float(np.interp(place, position, value)) - one) for place, one in places]
 
 
 def _cec(text: str) -> Iterator[float]:
