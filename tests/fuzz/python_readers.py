@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import acquisition_readers as acquisition
+import table_reader
 import workbooks
 
 import stepdiag as sd
@@ -88,6 +89,7 @@ READERS = {
     "replies": Reader(acquisition.read_replies, acquisition.replies, ".json"),
     "lines": Reader(acquisition.read_lines, acquisition.lines, ".jsonl"),
     "wishes": Reader(acquisition.read_wishes, acquisition.wishes, ".txt"),
+    "table": Reader(table_reader.read, table_reader.seeds, ".txt"),
     "workbook": Reader(workbooks.read, workbooks.seeds, ".xlsx", False, workbooks.spoiled),
 }
 

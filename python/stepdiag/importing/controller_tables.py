@@ -151,6 +151,8 @@ def _said(text: str) -> Mapping[str, str]:
 
 def _triple(said: Mapping[str, str], name: str) -> Triple | None:
     words = said.get(name, "").replace(",", " ").split()
+    if not all(re.fullmatch(_NUMBER, word) for word in words):
+        raise InvalidArgument(f"{name}: expected three numbers, got {said[name]!r}")
     return (float(words[0]), float(words[1]), float(words[2])) if len(words) == 3 else None
 
 
@@ -233,7 +235,13 @@ def _read(path: Path, text: str) -> _Read:
     form = _form_of(text)
     if form is None:
         raise InvalidArgument(f"{path}: is no table of a controller that stepdiag knows")
-    return _READERS[form](path, text)
+    try:
+        with np.errstate(all="raise"):
+            return _READERS[form](path, text)
+    except KeyError as missing:
+        raise InvalidArgument(f"{path}: {missing} is missing") from None
+    except (ValueError, IndexError, TypeError, ArithmeticError, np.linalg.LinAlgError) as wrong:
+        raise InvalidArgument(f"{path}: cannot be read as a table of this form: {wrong}") from None
 
 
 def _etalon(path: Path, text: str) -> _Read:
