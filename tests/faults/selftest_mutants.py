@@ -56,6 +56,8 @@ NO_RESULTS: Final = (
     "_plainest",
     "__post_init__",
     "_falls_by",
+    "_motors_by",
+    "_end",
 )
 WAYS: Final = """
 from stepdiag.selftest.cases import KNOWN
@@ -75,6 +77,11 @@ ALLOWED: Final = {
     ("exporting/axis_tables.py", "- own: the other sign"): "the stated loss",
     ("exporting/axis_tables.py", "0.0 is 1.0"): "what no table is left by, or where nothing acts",
     ("exporting/axis_tables.py", "most - 1"): "how many points there may be",
+    ("exporting/axis_tables.py", "without its minus"): "the last of two axes that are alike",
+    ("exporting/tool_side.py", "tool + beside"): "the stated loss",
+    ("exporting/heidenhain.py", "0.0 is 1.0"): "a place where nothing acts",
+    ("importing/controller_tables.py", "value[-1] - value[0]"): "what is 0 at home",
+    ("importing/controller_tables.py", "position[-1] - position[0]"): "what is 0 at home",
     ("importing/controller_tables.py", "block.count"): "a line in a message",
     ("importing/controller_tables.py", "0.0 is 1.0"): "tables without rows, or where nothing acts",
     ("exporting/isg.py", "sum((len"): "number of records, in a comment",
