@@ -316,7 +316,6 @@ def verify(
     """
     from stepdiag.config.toml_text import located
     from stepdiag.findings.faults import fault_text
-    from stepdiag.importing.controller_tables import machine_of_tables
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
     from stepdiag.presentation.blocks import text_of
@@ -334,6 +333,8 @@ def verify(
     measurement = read_measurement(run)
     with located(f"{calibration}, {run}"), Progress("verify"):
         if tables:
+            from stepdiag.importing.controller_tables import machine_of_tables
+
             table = machine_of_tables(tables, tested)
             verification, compensated = verify_compensated(tested, known, measurement, table)
         else:

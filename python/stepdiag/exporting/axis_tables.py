@@ -106,8 +106,6 @@ def axis_tables(
     `points`: of a table, at most. `pairs`: functions that the format can carry; of these `options.tables` are chosen
     such that the mean of squares falls most. `both`: of which it can carry two directions of approach; of the others it
     carries the mean. Raises InvalidArgument."""
-    if points < 2:
-        raise InvalidArgument(f"`rows`: expected at least 2, got {points}")
     if options.tables is not None and options.tables < 1:
         raise InvalidArgument(f"`tables`: expected at least 1, got {options.tables}")
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)

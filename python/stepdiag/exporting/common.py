@@ -82,6 +82,14 @@ def origin_of(options: ExportOptions) -> FloatArray:
     return np.array(options.origin or (0.0, 0.0, 0.0), dtype=float)
 
 
+def rows_of(options: ExportOptions, most: int, usual: int | None = None) -> int:
+    """Largest number of rows of a table. Raises InvalidArgument beyond `most`."""
+    rows = (usual or most) if options.rows is None else options.rows
+    if not 2 <= rows <= most:
+        raise InvalidArgument(f"`rows`: expected 2 to {most}, got {rows}")
+    return rows
+
+
 def line_point(calibration: Calibration, options: ExportOptions) -> FloatArray:
     """The point on the corrected lines, mm from home. Raises InvalidArgument outside of the volume."""
     at = calibration.volume / 2.0 if options.at is None else np.array(options.at, dtype=float)

@@ -9,8 +9,8 @@ ISG CSV, they do not say the sign: the tables are those of tool_side.py, as of `
 from pathlib import Path
 from typing import Final
 
-from stepdiag._core import Calibration, InvalidArgument
-from stepdiag.exporting.common import in_ascii, require
+from stepdiag._core import Calibration
+from stepdiag.exporting.common import in_ascii, require, rows_of
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of, heading
 from stepdiag.exporting.tool_side import tool_side
@@ -23,9 +23,7 @@ MOST_ROWS: Final = 5000
 
 def etalon(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """The file."""
-    rows = MOST_ROWS if options.rows is None else options.rows
-    if not 2 <= rows <= MOST_ROWS:
-        raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, got {rows}")
+    rows = rows_of(options, MOST_ROWS)
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     written = tool_side(calibration, options, rows, apart=options.squareness == "parameters")
     where = "as parameters" if written.squareness else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
@@ -46,8 +44,8 @@ def etalon(calibration: Calibration, output: Path, options: ExportOptions) -> Ex
     for x, functions in written.tables.values():
         for name, values in functions.items():
             digits = 9 if name[1] in "XYZ" else 12
-            rows_of = [f"{p:.9f} {value + 0.0:.{digits}f}" for p, value in zip(x, values, strict=True)]
-            blocks.append("\n".join([f"[{name}]", "Gridpoints = {", *rows_of, "}"]))
+            points = [f"{p:.9f} {value + 0.0:.{digits}f}" for p, value in zip(x, values, strict=True)]
+            blocks.append("\n".join([f"[{name}]", "Gridpoints = {", *points, "}"]))
     said = ["stepdiag export --to etalon", *provenance_rows(calibration), *lines]
     head = "".join(f"// {line}\n" for line in said)
     return Export(

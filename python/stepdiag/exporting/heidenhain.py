@@ -22,9 +22,9 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Calibration, InvalidArgument
+from stepdiag._core import Calibration
 from stepdiag.exporting.axis_tables import axis_tables
-from stepdiag.exporting.common import FloatArray, in_ascii, origin_of, require
+from stepdiag.exporting.common import FloatArray, in_ascii, origin_of, require, rows_of
 from stepdiag.exporting.left_in_volume import what_is_left
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, coverage_of, heading
@@ -34,7 +34,7 @@ from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 COMPANION: Final = "compensation.txt"
 UNTRIED: Final = "written from the manual ({}), not tried on a controller"
-MOST_POINTS: Final = 200
+MOST_POINTS: Final = 200  # unless more are asked for
 MOST_ENTRIES: Final = 100  # of COMPTAB, with those of MachAxis
 SIGN: Final = (
     "sign: errors, actual - commanded of the tool relative to the workpiece, positive where the travel is too long; "
@@ -45,7 +45,7 @@ SIGN: Final = (
 def heidenhain_com(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """A .COM table for each axis, and the .CMA table that assigns them."""
     itself = [(n, n) for n in range(3)]
-    tables, left, missing = axis_tables(calibration, options, _points(options), both=itself)
+    tables, left, missing = axis_tables(calibration, options, rows_of(options, 5000, MOST_POINTS), both=itself)
     origin = origin_of(options)
     lines = [
         UNTRIED.format("MANUALplus 620"),
@@ -76,7 +76,7 @@ def heidenhain_kinematics(calibration: Calibration, output: Path, options: Expor
     """KinematicsComp: .COM tables with the six errors of each axis, and the lines of the description."""
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     zero = np.array(options.fixed or (0.0, 0.0, 0.0))
-    written = tool_side(calibration, options, _points(options), zero=zero)
+    written = tool_side(calibration, options, rows_of(options, 5000, MOST_POINTS), zero=zero)
     description = []
     for axis in reversed(written.letters):
         straight = [name for name in AXES if name != axis]
@@ -113,12 +113,6 @@ def heidenhain_kinematics(calibration: Calibration, output: Path, options: Expor
     )
     files[output / COMPANION] = _companion("heidenhain-kinematics", calibration, lines)
     return Export(files, lines, coverage_of(calibration, [*FUNCTIONS, *SQUARENESSES]))
-
-
-def _points(options: ExportOptions) -> int:
-    if options.rows is not None and not 2 <= options.rows <= 5000:
-        raise InvalidArgument(f"`rows`: expected 2 to 5000, got {options.rows}")
-    return options.rows or MOST_POINTS
 
 
 def _table(name: str, columns: Mapping[str, FloatArray]) -> str:

@@ -14,13 +14,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from stepdiag._core import Calibration, InvalidArgument
+from stepdiag._core import Calibration
 from stepdiag.exporting.common import (
     APPROACH_WORDS,
     FloatArray,
     in_ascii,
     origin_of,
     require,
+    rows_of,
     temperature_row,
     tool_of,
     words,
@@ -37,9 +38,7 @@ MOST_ROWS: Final = 5000
 
 def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """The file, and the entries of the compensation list that belong to it."""
-    rows = MOST_ROWS if options.rows is None else options.rows
-    if not 2 <= rows <= MOST_ROWS:
-        raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, got {rows}")
+    rows = rows_of(options, MOST_ROWS)
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     tool, origin = tool_of(calibration, options), origin_of(options)
     approach = options.approach or "mean"

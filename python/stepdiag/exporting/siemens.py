@@ -20,7 +20,7 @@ from typing import Final
 
 from stepdiag._core import Calibration, InvalidArgument
 from stepdiag.exporting.axis_tables import AxisTables, axis_tables
-from stepdiag.exporting.common import FloatArray, in_ascii, origin_of
+from stepdiag.exporting.common import FloatArray, in_ascii, origin_of, rows_of
 from stepdiag.exporting.left_in_volume import what_is_left
 from stepdiag.exporting.options import ExportOptions
 from stepdiag.exporting.result import Export, heading
@@ -40,7 +40,9 @@ BYTES: Final = 8  # of a value, in the controller's memory
 def siemens_enc_comp(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """Leadscrew and measuring system error compensation: the positioning of each axis, alike in both directions."""
     names = _names(options)
-    tables, left, missing = axis_tables(calibration, options, _points(options), [(n, n) for n in range(3)], both=())
+    tables, left, missing = axis_tables(
+        calibration, options, rows_of(options, MOST_OF_840D, MOST_POINTS), [(n, n) for n in range(3)], both=()
+    )
     most = max((len(tables.positions[by]) for _, by in tables.functions), default=0)
     settings = [f"MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{names[n]}] = {most}" for n in range(3)]
     lines = [
@@ -67,7 +69,7 @@ def siemens_enc_comp(calibration: Calibration, output: Path, options: ExportOpti
 def siemens_cec(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """Sag and angularity error compensation: the error of each axis by each axis, also of its own direction."""
     names = _names(options)
-    tables, left, missing = axis_tables(calibration, options, _points(options))
+    tables, left, missing = axis_tables(calibration, options, rows_of(options, MOST_OF_840D, MOST_POINTS))
     settings = "; ".join(f"[{t}] = {len(tables.positions[by])}" for t, _, by, _, _ in _numbered(tables))
     size = BYTES * sum(len(values) for *_, values in _numbered(tables))
     lines = [
@@ -91,12 +93,6 @@ def siemens_cec(calibration: Calibration, output: Path, options: ExportOptions) 
         body += [f"$AN_CEC_DIRECTION[{t}]={direction}", f"$AN_CEC_MULT_BY_TABLE[{t}]=0", f"$AN_CEC_IS_MODULO[{t}]=0"]
     text = _text("%_N_NC_CEC_INI", "siemens-cec", calibration, lines, body)
     return Export({output: text}, lines, tables.coverage(calibration), left, motors=tables.motors)
-
-
-def _points(options: ExportOptions) -> int:
-    if options.rows is not None and not 2 <= options.rows <= MOST_OF_840D:
-        raise InvalidArgument(f"`rows`: expected 2 to {MOST_OF_840D}, got {options.rows}")
-    return options.rows or MOST_POINTS
 
 
 def _names(options: ExportOptions) -> tuple[str, str, str]:

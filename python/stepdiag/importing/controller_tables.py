@@ -115,7 +115,7 @@ def read_controller_tables(
 def machine_of_tables(files: Sequence[Path], calibration: Calibration) -> Machine:
     """A machine with the errors that these tables, made for the calibration, compensate; or with those of a file of it.
 
-    What files of others do not say of the machine is that of the calibration, with home at 0."""
+    What files of others do not say of the machine is that of the calibration; home is where their tables begin."""
     if not all(is_controller_table(file) for file in files):
         if len(files) != 1:
             raise InvalidArgument(f"{files[0]}: expected one calibration, or tables of a controller")
@@ -218,17 +218,23 @@ def _with_squarenesses(errors: ErrorMap) -> tuple[ErrorMap, list[str]]:
 
 
 def _form_of(text: str) -> str | None:
+    """By the first line that is no comment, or by what stands in a file of one form alone."""
+    lines = (line.strip() for line in text.splitlines())
+    first = next((line for line in lines if line and not line.startswith(("//", ";", "#"))), "")
     beginnings = {
-        "etalon": r"\s*(?://.*\s+)*\[[A-Z]+0?[A-Z]\]\s*(?:VALUE|Gridpoints)\s*=",
-        "isg": r"\s*(?://.*\s+)*(?:[XYZ]\s+|P0X\s+|C0Y\s+)+E?\w{2,3}",
-        "siemens": r"(?s).*\$A[AN]_(?:ENC_COMP|CEC)\s*\[",
+        "etalon": r"\[(?:E[XYZABC][XYZABC]|[XYZABC]0[XYZABC])\]",
+        "isg": r"(?:[XYZ]\s+)+E[XYZABC][XYZ]\b|(?:P0X|C0Y|B0Z|A0Z)\b",
         "heidenhain": r"BEGIN +\w+\.COM MM",
-        "comp": r"# stepdiag export --to linuxcnc-comp|(?s:.*)\[JOINT_\d\][^\[]*COMP_FILE\s*=",
-        "firmware": r"(?:[;#].*\s+|\s+)*(?:M556|M852|SET_SKEW)\s",
-        "hal": r"(?:#.*\s+|\s+)*setp (?:matrixkins|calibxyzkins)\.",
-        "own": r"# format=stepdiag (?:squareness|position error)",
+        "firmware": r"(?:M556|M852|SET_SKEW)\s",
+        "hal": r"setp (?:matrixkins|calibxyzkins)\.",
     }
-    return next((form for form, pattern in beginnings.items() if re.match(pattern, text)), None)
+    if "$AN_CEC" in text or "$AA_ENC_COMP" in text:
+        return "siemens"
+    if "[JOINT_" in text and "COMP_FILE" in text:
+        return "comp"
+    if text.startswith(("# format=stepdiag squareness", "# format=stepdiag position error")):
+        return "own"
+    return next((form for form, pattern in beginnings.items() if re.match(pattern, first)), None)
 
 
 def _read(path: Path, text: str) -> _Read:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
@@ -92,10 +93,21 @@ def verify_compensated(
     """Verify with a run that was measured with a table in force.
 
     `table`: a machine that has the errors of the table, which a controller subtracts at the commanded position."""
-    shift = -table.first_order_error(measurement.position)
+    shift = np.zeros_like(measurement.position)
+    approach = [_approach(*row) for row in zip(measurement.line, measurement.direction, strict=True)]
+    for signs in set(approach):  # a table may have two directions of travel
+        rows = [k for k, one in enumerate(approach) if one == signs]
+        shift[rows] = -table.first_order_error(measurement.position[rows], signs)
     found = [verify(calibration, scenario, measurement, sent=factor * shift) for factor in (1.0, 0.0, -1.0)]
     sizes = [one.chi_square for one in found]
     return found[0], Compensated(sizes[0], sizes[1], sizes[2], found[0].degrees_of_freedom)
+
+
+def _approach(line: str, direction: str) -> str:
+    """The direction in which X, Y, Z come to the points of a line; an axis that stands counts as +."""
+    forward = {"p": "+", "n": "-", "0": "+"}
+    backward = {"p": "-", "n": "+", "0": "+"}
+    return "".join((backward if direction == "backward" else forward)[letter] for letter in line)
 
 
 def with_stated_between_nodes(calibration: Calibration, known: Known) -> Calibration:

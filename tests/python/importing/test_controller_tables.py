@@ -184,3 +184,12 @@ def test_squarenesses_alone_have_no_other(tmp_path: Path) -> None:
     found = read_back(random_calibration(3), "squareness", tmp_path / "s.csv")
     assert set(found.errors.squareness) == set(SQUARENESSES)
     assert any("not in the file: EXX" in line for line in found.text)
+
+
+@pytest.mark.parametrize(
+    "head", ["X\tY\tZ\tDistance", "x y z distance", "[EMC]\nVERSION = 1.1", "\n" * 5000 + "line,point"]
+)
+def test_what_is_no_table_is_left_to_others(tmp_path: Path, head: str) -> None:
+    file = tmp_path / "readings.txt"
+    file.write_text(f"{head}\n0\t0\t0\t1\n")
+    assert not is_controller_table(file)

@@ -5,6 +5,7 @@ functions, as straightnesses and positioning errors are.
 """
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,9 @@ from verified import TESTED
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.importing.controller_tables import read_controller_tables
+from stepdiag.io.data_files import read_measurement
+from stepdiag.rechecking import verification
+from stepdiag.scenario.description import read_scenario
 
 SIGNS = {"right": 1.0, "off": 0.0, "wrong": -1.0}
 
@@ -58,7 +62,6 @@ def test_a_run_tells_whether_the_table_acts(
     assert status == 3
     verdict = {"off": "those of the machine without the table", "wrong": "acts with the wrong sign: take it away"}
     assert verdict[way] in said.err
-    # Without the option a run of the compensated machine does not agree, which it must not be blamed for.
 
 
 def test_a_table_of_a_calibration_file_is_taken_too(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,3 +71,22 @@ def test_a_table_of_a_calibration_file_is_taken_too(files: Path, capsys: pytest.
     capsys.readouterr()
     assert main(["verify", "calibration.nc", "tested.toml", "new.csv", "--compensated", "kins.csv"]) == 3
     assert "those of the machine without the table" in capsys.readouterr().err
+
+
+def test_a_table_of_two_directions_acts_by_the_direction_of_each_axis(
+    files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario, run = read_scenario("tested.toml"), read_measurement("new.csv")
+    errors = sd.ErrorMap({"EXX": ([0.0], [1.0])}, negative_functions={"EXX": ([0.0], [2.0])})
+    sent = []
+    monkeypatch.setattr(verification, "verify", lambda *_, sent: shifts_of(sent))
+
+    def shifts_of(shift: np.ndarray) -> object:
+        sent.append(shift)
+        return SimpleNamespace(chi_square=0.0, degrees_of_freedom=1)
+
+    verification.verify_compensated(None, scenario, run, sd.Machine("[w b X Y Z t]", errors))  # type: ignore[arg-type]
+    expected = [{"p": -1.0, "n": -2.0}[line[0]] for line in run.line]
+    assert {"ppp", "nnp"} == set(run.line)
+    assert sent[0][:, 0].tolist() == expected
+    assert verification._approach("p0n", "backward") == "-++"
