@@ -243,11 +243,15 @@ def _read(path: Path, text: str) -> _Read:
         raise InvalidArgument(f"{path}: is no table of a controller that stepdiag knows")
     try:
         with np.errstate(all="raise"):
-            return _READERS[form](path, text)
+            read = _READERS[form](path, text)
     except KeyError as missing:
         raise InvalidArgument(f"{path}: {missing} is missing") from None
     except (ValueError, IndexError, TypeError, ArithmeticError, np.linalg.LinAlgError) as wrong:
         raise InvalidArgument(f"{path}: cannot be read as a table of this form: {wrong}") from None
+    unknown = {*read.functions, *read.negative, *read.squareness} - {*FUNCTIONS, *SQUARENESSES}
+    if unknown:
+        raise InvalidArgument(f"{path}: expected errors of X, Y and Z, got {', '.join(sorted(unknown))}")
+    return read
 
 
 def _etalon(path: Path, text: str) -> _Read:
