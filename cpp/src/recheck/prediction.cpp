@@ -401,8 +401,7 @@ ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
                 --test.freedom;
             }
     }
-    double free = 0.0;  // of the free unknowns, those that the readings tell  // of the free unknowns, those that the
-                        // readings tell
+    double free = 0.0;  // of the free unknowns, those that the readings tell
     for (std::size_t k = 0; k < setups_.size(); ++k) {
         const LineSetup& setup = problem_.setups()[k];
         const SetupRows& rows = setups_[k];

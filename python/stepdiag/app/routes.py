@@ -54,6 +54,8 @@ from stepdiag.io.data_files import date_of_today
 BETWEEN_STATES: Final = 0.03  # s, of a stream
 BETWEEN_LOOKS: Final = 1.0  # s, at what a process said
 SHEETS: Final = (".xlsx", ".ods", ".xls", ".txt", ".tsv")  # that `stepdiag import` reads
+# Of programs, by maker.
+_ENDINGS: Final = {"siemens": ".mpf", "heidenhain": ".h", "linuxcnc": ".ngc"}
 
 
 class NotHere(Exception):
@@ -318,6 +320,9 @@ class App:
         words = ["export", *self._of(machine), entry.file, "--to", to]
         words += ["--replaces", self.entry(machine, replaced).file] if replaced != NONE else []
         words += ["--incomplete"] if given.get("incomplete") else []
+        if given.get("proof"):
+            ending = _ENDINGS.get(FORMATS[to].maker, ".iso")
+            words += ["--proof", await asyncio.to_thread(_free, machine, "plans", f"sign-{to}", ending)]
         fields = [one for one in TABLE_FIELDS if one in FORMATS[to].options]
         words += _options(given, [field for field in fields if field != "at"])
         words += ["--at", *given["at"].replace(",", " ").split()] if "at" in fields and given.get("at") else []

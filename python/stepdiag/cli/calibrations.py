@@ -347,17 +347,20 @@ def verify(
             *warnings,
         ]
     warnings += [f"{run}: {fault_text(found)}" for found in verification.left_out]
-    if compensated is not None and compensated.is_in_force:
-        say(compensated.sentence(), err=as_json)
-    elif compensated is not None:
+    if compensated is not None and compensated.acts != "as it is":
         warnings = [f"{tables[0]}: {compensated.sentence()}", *warnings]
     if as_json:
         from stepdiag.presentation.objects.verification import verification_object
         from stepdiag.presentation.objects.writer import json_text
 
         files = (calibration, run)
-        click.echo(json_text(verification_object(verification, tested, measurement, alpha, files, warnings)))
+        found = verification_object(
+            verification, tested, measurement, alpha, files, warnings, compensated=compensated, tables=tables
+        )
+        click.echo(json_text(found))
     else:
+        if compensated is not None and compensated.acts == "as it is":
+            say(compensated.sentence())
         for line in text_of(verification_blocks(verification, measurement, alpha)):
             say(line)
     for warning in warnings:

@@ -56,7 +56,7 @@ def _ending(params: Mapping[str, Any]) -> str:
 
 @click.command(
     cls=OfMachine,
-    makes={"output": Kept("exports", _ending)},
+    makes={"output": Kept("exports", _ending), "proof": Kept("plans")},
     epilog="\b\nFormats:\n"
     + "".join(f"  {name:<22}{one.what}\n" for name, one in FORMATS.items())
     + f"\n\b\nMakers: {', '.join(MAKERS)}\n"

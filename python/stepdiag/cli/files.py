@@ -11,7 +11,7 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, out_file, tell
 from stepdiag.cli.terminal import plain, say
-from stepdiag.io.outputs import IMPORTED_MAP, MEASUREMENT, SELFTEST, OutputFile
+from stepdiag.io.outputs import IMPORTED_CALIBRATION, IMPORTED_MAP, MEASUREMENT, SELFTEST, OutputFile
 from stepdiag.progress import Progress
 
 HEADS: Final = ("ideal", "psd", "multi_beam")
@@ -293,6 +293,13 @@ def selftest(context: click.Context, output: OutputFile | None, as_json: bool) -
 @click.option("--chain", metavar="CHAIN", help="Chain of the machine, for tables of controllers that do not say it.")
 @click.option("--volume", type=float, nargs=3, metavar="X Y Z", help="Volume, mm, likewise.  [default: their end]")
 @click.option("--tool", type=float, nargs=3, metavar="X Y Z", help="Tool offset, mm, likewise.  [default: 0 0 0]")
+@click.option(
+    "--uncertainty",
+    type=float,
+    nargs=2,
+    metavar="UM URAD",
+    help="Standard uncertainty of a table, lengths and angles: makes a calibration (.nc) that `verify` takes.",
+)
 @click.option("--scenario", type=PATH, metavar="FILE", help="Take the commanded positions from this scenario's plan.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing measurement of this name.")
 def import_(
@@ -308,6 +315,7 @@ def import_(
     chain: str | None,
     volume: tuple[float, float, float] | None,
     tool: tuple[float, float, float] | None,
+    uncertainty: tuple[float, float] | None,
     scenario: Path | None,
     overwrite: bool,
 ) -> None:
@@ -320,24 +328,34 @@ def import_(
 
     Or FILE is an error map in the form of a controller or of another program, which becomes one of
     stepdiag: Etalon Exchange Format (TRAC-CAL), ISG CSV, SINUMERIK, Heidenhain .COM, COMP_FILEs by
-    their compensation.ini, a firmware's command. It can be plotted, compared, exported, verified.
+    their compensation.ini, a firmware's command. It can be plotted, compared and exported; with
+    --uncertainty, which such tables do not state, it is a calibration that `verify` takes too.
     """
     from stepdiag.importing.controller_tables import is_controller_table, read_controller_tables
+    from stepdiag.io.data_files import write_calibration
+    from stepdiag.units import MICROMETRE, MICRORADIAN
 
     tables = [is_controller_table(file) for file in files]
     if all(tables):
         given = {"column": columns, "separator": separator, "decimal": decimal, "sheet": sheet, "scenario": scenario}
         if other := next((name for name, value in given.items() if value), None):
             raise InvalidArgument(f"`{other}`: belongs to sheets of readings; {files[0]} is a controller's table")
-        path = OutputFile(output.path, (IMPORTED_MAP,)).claim(*files)
+        path = OutputFile(output.path, (IMPORTED_MAP,) if uncertainty is None else (IMPORTED_CALIBRATION,)).claim(
+            *files
+        )
         found_map = read_controller_tables(files, chain=chain, volume=volume, tool=tool, origin=origin)
-        found_map.errors.write(path, chain=found_map.chain, volume=found_map.volume, tool=found_map.tool)
+        if uncertainty is None:
+            found_map.errors.write(path, chain=found_map.chain, volume=found_map.volume, tool=found_map.tool)
+        else:
+            lengths, angles = uncertainty
+            write_calibration(found_map.as_calibration(lengths * MICROMETRE, angles * MICRORADIAN), path)
         for line in found_map.text:
             say(line)
         return
-    if any((chain, volume, tool)):
+    if any((chain, volume, tool, uncertainty)):
         raise InvalidArgument(
-            f"{files[tables.index(False)]}: no table of a controller; `chain`, `volume`, `tool` go with one"
+            f"{files[tables.index(False)]}: no table of a controller; `chain`, `volume`, `tool`, `uncertainty` go with "
+            "one"
         )
     from stepdiag.importing.run import import_files
     from stepdiag.io.data_files import write_measurement

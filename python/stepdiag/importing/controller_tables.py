@@ -25,6 +25,7 @@ from stepdiag.units import MICROMETRE, MICRORADIAN
 FloatArray = npt.NDArray[np.float64]
 Table = tuple[FloatArray, FloatArray]  # positions in the controller's coordinates, mm; values, mm or rad
 Triple = tuple[float, float, float]
+IMPORTED: Final = "import"  # the method of a calibration that was a table of others
 _NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
@@ -49,6 +50,44 @@ class ImportedMap:
     volume: Triple
     tool: Triple
     text: Sequence[str]
+
+    def as_calibration(self, lengths: float, angles: float) -> Calibration:
+        """The map as a calibration whose values have these standard uncertainties, mm and rad, uncorrelated.
+
+        Raises InvalidArgument unless both are above 0."""
+        if not (0.0 < lengths < np.inf and 0.0 < angles < np.inf):
+            raise InvalidArgument("`uncertainty`: expected a length and an angle above 0")
+        of = {"X": lengths, "Y": lengths, "Z": lengths}
+        functions = {
+            name: (x, value, np.full(len(x), of.get(name[1], angles)))
+            for name, (x, value) in self.errors.functions.items()
+        }
+        reversal = {
+            name: (
+                x,
+                self.errors.function(name, x, "+") - value,
+                np.full(len(x), np.sqrt(2.0) * of.get(name[1], angles)),
+            )
+            for name, (x, value) in self.errors.negative_functions.items()
+        }
+        squareness = {name: (angle, angles) for name, angle in self.errors.squareness.items()}
+        in_order = [functions[name][2] for name in FUNCTIONS if name in functions]
+        in_order.append(np.full(len(squareness), angles))
+        return Calibration(
+            IMPORTED,
+            Chain(self.chain),
+            self.volume,
+            self.tool,
+            functions,
+            squareness,
+            reversal=reversal,
+            reversal_negative_uncertainty={name: functions[name][2] for name in reversal},
+            covariance=np.diag(np.concatenate(in_order) ** 2),
+            conditions=[
+                f"standard uncertainties stated at import: {lengths / MICROMETRE:g} µm, {angles / MICRORADIAN:g} µrad, "
+                "uncorrelated"
+            ],
+        )
 
 
 def is_controller_table(path: Path) -> bool:

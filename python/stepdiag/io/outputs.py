@@ -72,6 +72,7 @@ CELLS: Final = FileKind("study cells", (), "cells of an interrupted study; `resu
 # Files of the demonstrations.
 ERROR_MAP: Final = FileKind("error map")
 IMPORTED_MAP: Final = FileKind("error map", (".csv",))
+IMPORTED_CALIBRATION: Final = FileKind("calibration", (".nc",))
 REPORT: Final = FileKind("report of the demonstration")
 POINTS: Final = FileKind("table of points")
 

@@ -3,7 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -58,6 +58,13 @@ def verify(
     )
 
 
+_VERDICTS: Final = {
+    "as it is": "the table is in force, with the right sign",
+    "not": "the readings are those of the machine without the table",
+    "turned": "the table acts with the wrong sign: take it away",
+}
+
+
 @dataclass(frozen=True)
 class Compensated:
     """Chi-square of a run by a calibration, with a table in force as it is, without it, and with its sign turned."""
@@ -72,19 +79,14 @@ class Compensated:
             f"chi-square with the table {self.with_it:.5g}, without it {self.without:.5g}, with its sign turned "
             f"{self.turned:.5g}, {self.degrees_of_freedom} degrees of freedom"
         )
-        return f"{figures}: {self.verdict}"
+        return f"{figures}: {_VERDICTS[self.acts]}"
 
     @property
-    def is_in_force(self) -> bool:
-        return self.with_it <= min(self.without, self.turned)
-
-    @property
-    def verdict(self) -> str:
-        if self.is_in_force:
-            return "the table is in force, with the right sign"
-        if self.without <= self.turned:
-            return "the readings are those of the machine without the table"
-        return "the table acts with the wrong sign: take it away"
+    def acts(self) -> Literal["as it is", "not", "turned"]:
+        """What the smallest of the three says."""
+        if self.with_it <= min(self.without, self.turned):
+            return "as it is"
+        return "not" if self.without <= self.turned else "turned"
 
 
 def verify_compensated(

@@ -326,8 +326,13 @@ def test_compensation_asks_for_the_present_table_and_leads_back(person: TestClie
     answer = person.post(f"{machine}/files", params={"name": "read.csv"}, content=table.read_bytes())
     ended(person, httpx.Response(303, headers={"location": answer.json()["job"]}))
     assert f"already in the book as exports/{table.name}" in person.get(answer.json()["job"]).text
-    answer = person.post(f"{machine}/exports", data={**form, "replaces": "none"})
-    assert ended(person, answer)["status"] == 0
+    answer = person.post(f"{machine}/exports", data={**form, "replaces": "none", "to": "siemens-cec", "proof": "yes"})
+    state = ended(person, answer)
+    shown = person.get(answer.headers["location"]).text
+    assert state["status"] == 0, shown
+    assert "proof of the sign: " in shown
+    assert "sign-siemens-cec.mpf" in shown
+    assert "Measuring program to prove a sign" in (MACHINE / "plans/sign-siemens-cec.mpf").read_text()
 
 
 def test_trend_screen(person: TestClient) -> None:

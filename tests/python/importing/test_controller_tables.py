@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from exported import TOOL, VOLUME, export, machine_of, points_in, random_calibra
 from refusal import refused
 from simple_exports import MOTORS
 from usual import ALL_CHAINS
+from verified import TESTED
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -39,6 +41,43 @@ def read_back(calibration: sd.Calibration, to: str, output: Path, **options: obj
     if to == "linuxcnc-comp":
         given = {"chain": calibration.chain.name}
     return read_controller_tables(files_of(to, output), **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("to", ["etalon", "isg"])
+def test_a_table_with_a_stated_uncertainty_is_verified(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], to: str
+) -> None:
+    """The truth in a file of others, and readings of the machine: chi-square is what its degrees of freedom say. Of
+    another machine it is not."""
+    monkeypatch.chdir(tmp_path)
+    Path("tested.toml").write_text(TESTED)
+    Path("other.toml").write_text(TESTED.replace("seed = 5", "seed = 6"))
+    for name in ("tested", "other"):
+        assert main(["simulate", f"{name}.toml", "-o", f"{name}.csv"]) == 0
+    truth = sd.random_error_map((400.0, 300.0, 250.0), seed=5, intervals=6)
+    zero = {name: (x, v, np.zeros_like(x)) for name, (x, v) in truth.functions.items()}
+    squareness = {name: (angle, 0.0) for name, angle in truth.squareness.items()}
+    calibration = sd.Calibration("truth", "[w X' b Y Z t]", (400.0, 300.0, 250.0), (0.0, 0.0, 0.0), zero, squareness)
+    export(calibration, to, Path("table.txt"))
+    assert main(["import", "table.txt", "--uncertainty", "0.01", "0.01", "-o", "table.nc"]) == 0
+    found = sd.read_calibration("table.nc")
+    assert found.covariance is not None
+    assert (found["EXX"][2][1], found["C0Y"][2]) == (1e-5, 1e-8)
+    capsys.readouterr()
+    assert main(["verify", "table.nc", "tested.toml", "tested.csv", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["probability"] > 0.001
+    assert main(["verify", "table.nc", "other.toml", "other.csv"]) == 3
+
+
+@pytest.mark.parametrize("uncertainty", [("0", "1"), ("1", "-1"), ("nan", "1"), ("inf", "1")])
+def test_an_uncertainty_that_is_none_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], uncertainty: tuple[str, str]
+) -> None:
+    file, output = tmp_path / "table.txt", tmp_path / "table.nc"
+    export(random_calibration(1, ALL_CHAINS[0], intervals=3), "etalon", file)
+    assert main(["import", str(file), "--uncertainty", *uncertainty, "-o", str(output)]) == 2
+    assert "--uncertainty: expected a length and an angle above 0" in capsys.readouterr().err
+    assert not output.exists()
 
 
 @pytest.mark.parametrize("chain", ALL_CHAINS[::3])

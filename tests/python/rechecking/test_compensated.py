@@ -4,6 +4,7 @@ What a table does is put into the virtual machine as errors of its own: tables o
 functions, as straightnesses and positioning errors are.
 """
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -53,8 +54,15 @@ def test_a_run_tells_whether_the_table_acts(
     Path("changed.toml").write_text(changed)
     assert main(["simulate", "changed.toml", "-o", "changed.csv", "--overwrite"]) == 0
     capsys.readouterr()
-    status = main(["verify", "calibration.nc", "tested.toml", "changed.csv", "--compensated", str(file)])
+    command = ["verify", "calibration.nc", "tested.toml", "changed.csv", "--compensated", str(file)]
+    status = main(command)
     said = capsys.readouterr()
+    assert main([*command, "--json"]) == status
+    acts = json.loads(capsys.readouterr().out)["compensated"]
+    sizes = [acts[name] for name in ("chi_square", "chi_square_without", "chi_square_turned")]
+    assert acts["tables"] == [str(file)]
+    assert acts["acts"] == {"right": "as it is", "off": "not", "wrong": "turned"}[way]
+    assert list(SIGNS)[int(np.argmin(sizes))] == way
     if way == "right":
         assert status == 0, said
         assert "the table is in force, with the right sign" in said.out

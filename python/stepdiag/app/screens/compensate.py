@@ -91,6 +91,12 @@ def _form(machine: MachineFolder, entry: Entry) -> Markup:
                 element("label", " Write 0 for what is not determined", for_="incomplete"),
                 class_="choice",
             ),
+            element(
+                "p",
+                element("input", id="proof", name="proof", type="checkbox", value="yes"),
+                element("label", " Also a program that shows the sign before anything is cut", for_="proof"),
+                class_="choice",
+            ),
             element("p", element("button", "Make the table", class_="main")),
             element("input", type="hidden", name="file", value=entry.file),
             method="post",

@@ -13,6 +13,7 @@ from stepdiag.presentation.objects.evaluation import Faults, channel_unit, fault
 from stepdiag.presentation.objects.writer import Reported, first_keys
 from stepdiag.presentation.quantity import Quantity, quantity
 from stepdiag.presentation.verification import agrees, verification_blocks
+from stepdiag.rechecking.verification import Compensated
 
 
 class VerifiedLine(TypedDict):
@@ -40,6 +41,19 @@ class WorstReading(TypedDict):
     normalised: float
 
 
+class TableActing(TypedDict):
+    """Chi-square of the readings with a table in force as it is, without it, and with its sign turned."""
+
+    tables: list[str]
+    """The files."""
+    chi_square: float
+    chi_square_without: float
+    chi_square_turned: float
+    degrees_of_freedom: int
+    acts: Literal["as it is", "not", "turned"]
+    """As the smallest of the three says."""
+
+
 class VerificationObject(Reported):
     """Result of `stepdiag verify`."""
 
@@ -62,6 +76,8 @@ class VerificationObject(Reported):
     """Of a larger chi-square, if calibration, readings and uncertainties are right."""
     lines: list[VerifiedLine]
     worst: WorstReading
+    compensated: TableActing | None
+    """With `compensated`, whether the table acts."""
 
 
 def verification_object(
@@ -71,6 +87,9 @@ def verification_object(
     alpha: float,
     files: tuple[Path, Path],
     warnings: Sequence[str],
+    *,
+    compensated: Compensated | None = None,
+    tables: Sequence[Path] = (),
 ) -> VerificationObject:
     """How readings agree with a calibration."""
     return {
@@ -88,6 +107,18 @@ def verification_object(
         "probability": verification.probability,
         "lines": [_line(line) for line in verification.lines],
         "worst": _worst(verification, measurement),
+        "compensated": None if compensated is None else _acting(compensated, tables),
+    }
+
+
+def _acting(found: Compensated, tables: Sequence[Path]) -> TableActing:
+    return {
+        "tables": [str(table) for table in tables],
+        "chi_square": found.with_it,
+        "chi_square_without": found.without,
+        "chi_square_turned": found.turned,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "acts": found.acts,
     }
 
 
