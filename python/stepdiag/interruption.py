@@ -4,16 +4,14 @@ The command line ends the process, at any time (cli/interrupts.py); a program th
 gets Python's KeyboardInterrupt. Both leave files whole because whatever writes them says so here.
 """
 
-import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Final
 
-SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+from stepdiag.platform import SIGNALS, kill_descendants
 
 # Held while something is done wholly or not at all. What ends the process takes it and keeps it.
 _whole: Final = threading.RLock()
@@ -72,27 +70,3 @@ def end_of_process(patience: float) -> list[str]:
             said.append(text)
     kill_descendants()
     return said
-
-
-def kill_descendants() -> None:
-    """Kill the workers, browsers and other programs that this process has started, and theirs."""
-    parents: dict[int, int] = {}
-    with suppress(OSError):
-        for entry in os.listdir("/proc"):
-            if entry.isdigit():
-                with suppress(OSError, ValueError, IndexError):
-                    status = Path(f"/proc/{entry}/stat").read_text(errors="replace")
-                    parents[int(entry)] = int(status.rsplit(")", 1)[1].split()[1])
-    own = os.getpid()
-    ours = {own}
-    while more := {child for child, parent in parents.items() if parent in ours} - ours:
-        ours |= more
-    # What starts last is killed first. multiprocessing's tracker was first: processes that miss it start another.
-    children = sorted(ours - {own}, reverse=True)
-    for child in children:
-        with suppress(OSError):
-            os.kill(child, signal.SIGKILL)
-    for child in children:
-        with suppress(OSError):
-            if parents[child] == own:
-                os.waitpid(child, 0)

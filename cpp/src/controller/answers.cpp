@@ -1,4 +1,5 @@
 #include "controller/compensator_tables.hpp"
+#include "core/platform.hpp"
 
 namespace stepdiag {
 namespace {
@@ -66,9 +67,6 @@ struct Plain {
     }
 };
 
-#if defined(__x86_64__)
-#define STEPDIAG_FUSED [[gnu::target("avx2,fma")]]
-
 template <class Order, class Way>
 struct Fused {
     STEPDIAG_FUSED static unsigned error(const Tables& t, const double* p, const double* tool,
@@ -96,10 +94,6 @@ struct Fused {
                                one_command(command, t, targets, tool, temperature, commands, statuses));
     }
 };
-#else
-template <class Order, class Way>
-using Fused = Plain<Order, Way>;
-#endif
 
 template <class Order, class Way>
 Answers answers(bool fused) {
@@ -117,13 +111,7 @@ Answers answers(bool fused, bool at_temperature) {
 
 }  // namespace
 
-bool are_fused_answers_known() {
-#if defined(__x86_64__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return false;
-#endif
-}
+bool are_fused_answers_known() { return has_fused_multiply_add(); }
 
 Answers answers_for(const Chain& chain, bool fused, bool at_temperature) {
     switch (3 * index(chain.order()[0]) + index(chain.order()[1])) {

@@ -29,15 +29,25 @@ HWY_EXPORT(target);
 
 std::string instruction_set() { return HWY_DYNAMIC_DISPATCH(target)(); }
 
+namespace {
+
+// One alone is not chosen, and is there whatever Highway finds in the processor.
+std::vector<std::int64_t> targets() {
+    if constexpr ((HWY_TARGETS & (HWY_TARGETS - 1)) == 0) return {HWY_TARGETS};
+    return hwy::SupportedAndGeneratedTargets();
+}
+
+}  // namespace
+
 std::vector<std::string> instruction_sets() {
     std::vector<std::string> names;
-    for (const std::int64_t each : hwy::SupportedAndGeneratedTargets()) names.push_back(hwy::TargetName(each));
+    for (const std::int64_t each : targets()) names.push_back(hwy::TargetName(each));
     return names;
 }
 
 void choose_instruction_set(const std::string& name) {
     std::string known;
-    for (const std::int64_t each : hwy::SupportedAndGeneratedTargets()) {
+    for (const std::int64_t each : targets()) {
         if (name == hwy::TargetName(each)) {
             hwy::GetChosenTarget().Update(each);
             return;

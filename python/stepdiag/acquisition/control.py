@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 
 from stepdiag._core import InvalidArgument
 from stepdiag.io.whole_files import reason
+from stepdiag.platform import open_to_append
 
 Control = Literal["confirm", "pause", "go_on", "repeat_point", "repeat_line", "repeat_set_up", "keep", "remark", "stop"]
 
@@ -64,7 +65,7 @@ def ask_for(path: Path, control: Control, text: str = "") -> None:
         raise InvalidArgument(f"expected one of {', '.join(CONTROLS)}, got {control!r}")
     content: dict[str, Any] = {"control": control, **({"text": text[:LONGEST_REMARK]} if text else {})}
     try:
-        handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
+        handle = open_to_append(path)
         try:
             os.write(handle, json.dumps(content).encode() + b"\n")
         finally:

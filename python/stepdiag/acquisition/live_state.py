@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Self
 
+from stepdiag.platform import open_in_place, write_at_begin
+
 Doing = Literal["begins", "waits", "reads", "asks", "paused", "ended"]
 
 ROOM: Final = 2**14  # bytes of the file
@@ -92,7 +94,7 @@ class LiveFile:
         self._number = 0
         self._handle: int | None = None
         with suppress(OSError):
-            self._handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            self._handle = open_in_place(path)
 
     def publish(self, state: LiveState) -> None:
         if self._handle is None:
@@ -103,7 +105,7 @@ class LiveFile:
         if len(text) >= ROOM:
             text = json.dumps({**content, "messages": []}, separators=(",", ":")).encode()
         with suppress(OSError):
-            os.pwrite(self._handle, text[: ROOM - 1].ljust(ROOM - 1) + b"\n", 0)
+            write_at_begin(self._handle, text[: ROOM - 1].ljust(ROOM - 1) + b"\n")
 
     def close(self) -> None:
         if self._handle is not None:

@@ -4,7 +4,6 @@ The first line is the header. Then follow all values of the instrument, after th
 its reading, and the places where an acquisition began or was resumed (raw_records.py).
 """
 
-import fcntl
 import os
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -16,7 +15,8 @@ from typing import Final, Self
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Value, parse_record
 from stepdiag.instruments.instrument import Number
-from stepdiag.io.whole_files import check_output, read_bytes, reason, sync_folder
+from stepdiag.io.whole_files import check_output, read_bytes, reason
+from stepdiag.platform import lock, open_to_append, sync_folder
 
 _BEGINNING: Final = b'{"record":"header"'
 
@@ -67,7 +67,7 @@ class RawFile:
         """Create a file. Raises InvalidArgument if it exists and is begun."""
         check_new(path)
         try:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            handle = open_to_append(path, create=True)
         except OSError as error:
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         file = cls(path, handle)
@@ -90,7 +90,7 @@ class RawFile:
 
         Returns the file and its content."""
         try:
-            handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CLOEXEC)
+            handle = open_to_append(path)
         except OSError as error:
             raise InvalidArgument(f"{path}: cannot be continued: {reason(error)}") from None
         file = cls(path, handle)
@@ -133,7 +133,7 @@ class RawFile:
 
     def _lock(self) -> None:
         try:
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self._handle)
         except OSError:
             self.close()
             raise InvalidArgument(f"{self.path}: another acquisition is writing it") from None

@@ -18,7 +18,8 @@ from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.io.comp_set import check_set
-from stepdiag.io.whole_files import make_folder, reason, sync_folder
+from stepdiag.io.whole_files import make_folder, reason
+from stepdiag.platform import open_new, sync_folder
 
 MARK: Final = "BOOK.txt"
 INDEX: Final = "book.sqlite"
@@ -123,7 +124,7 @@ def reserve(folder: Path, name: str, *, exactly: bool = False, as_folder: bool =
             if as_folder:
                 path.mkdir()
             else:
-                os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
+                os.close(open_new(path, 0o666))
         except FileExistsError:
             continue
         except OSError as error:

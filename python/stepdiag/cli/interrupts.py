@@ -1,4 +1,4 @@
-"""The end of a command by Ctrl-C (SIGINT) or SIGTERM: within a second, with one line on standard error.
+"""The end of a command by Ctrl-C (SIGINT), SIGTERM, or Windows's Ctrl-Break: within a second, with one line.
 
 As a rule nothing has to be done but to remove temporary files, so the process just ends: no
 exception is raised within a library, which could deadlock, and no long computation is waited for.
@@ -16,7 +16,8 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Final, NoReturn
 
-from stepdiag.interruption import SIGNALS, end_of_process
+from stepdiag.interruption import end_of_process
+from stepdiag.platform import CLEARED_LINE, SIGNALS
 
 PATIENCE: Final = 0.8  # s, from the first signal to the end of the process
 _NOTHING: Final = 0  # not a number of a signal: the block that unwinds has ended
@@ -77,7 +78,7 @@ class _Interrupts:
         if not self._unwinding or self._raised:
             _park()
         self._raised = True
-        raise KeyboardInterrupt if number == signal.SIGINT else Terminated(128 + number)
+        raise Terminated(128 + number) if number == signal.SIGTERM else KeyboardInterrupt
 
     def _next(self, timeout: float | None) -> int | None:
         """The next signal; _NOTHING, _CLOSE; None: none came in time."""
@@ -156,7 +157,7 @@ def _park() -> NoReturn:
 
 def _say(number: int, said: list[str]) -> None:
     """One line, not by sys.stderr, whose lock the interrupted thread may hold."""
-    what = "interrupted" if number == signal.SIGINT else "terminated"
+    what = "terminated" if number == signal.SIGTERM else "interrupted"
     line = f"stepdiag: {': '.join([what, *(['; '.join(said)] if said else [])])}\n"
     with suppress(OSError):
-        os.write(2, (("\r\x1b[K" if os.isatty(2) else "") + line).encode(errors="replace"))  # over a progress bar
+        os.write(2, ((CLEARED_LINE if os.isatty(2) else "") + line).encode(errors="replace"))  # over a progress bar

@@ -27,6 +27,7 @@ from stepdiag.demo.loop_cases import CHAIN, RANGE
 from stepdiag.demo.loop_job import PATIENCE, FloatArray, Job, Say
 from stepdiag.linuxcnc.processes import LinuxcncError
 from stepdiag.linuxcnc.session import MODULE, LinuxcncSession, lacks_module, missing_programs
+from stepdiag.platform import NO_LINUXCNC
 from stepdiag.program.gcode import HANDSHAKE, Writer
 from stepdiag.scenario.order_of_run import Visit, visits_of
 from stepdiag.twin.server import Twin
@@ -57,6 +58,8 @@ class Linuxcnc:
     name = "LinuxCNC"
 
     def __init__(self) -> None:
+        if NO_LINUXCNC:
+            raise InvalidArgument(NO_LINUXCNC)
         bridges = [bridge for bridge in BRIDGES if bridge.is_file()]
         missing = missing_programs() + [str(MODULE)] * lacks_module() + [str(BRIDGES[-1])] * (not bridges)
         if missing:

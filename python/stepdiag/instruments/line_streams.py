@@ -1,8 +1,8 @@
 """Where lines come from: a TCP connection, or the standard output of a program; and the thread that reads them."""
 
 import os
+import select
 import selectors
-import signal
 import socket
 import subprocess
 import threading
@@ -14,6 +14,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.instruments.ids3010_messages import shown
 from stepdiag.instruments.instrument import InstrumentError
 from stepdiag.io.whole_files import reason
+from stepdiag.platform import OWN_GROUP, end_group, never_blocks, of_pipe, of_port
 
 LONGEST: Final = 2**16  # bytes of a line
 PIECE: Final = 2**16  # bytes read at once
@@ -26,11 +27,15 @@ GRACE: Final = 0.5  # s that a program has to end by SIGTERM; below what Ctrl-C 
 
 
 class Stream(Protocol):
-    """Bytes that come without being asked for; reading does not block."""
+    """Bytes that come without being asked for."""
 
     name: str
 
-    def fileno(self) -> int: ...
+    def fileno(self) -> int:
+        """What a selector waits for."""
+
+    def read(self, size: int) -> bytes:
+        """What has come; nothing at the end. Does not block; raises OSError, where nothing has come BlockingIOError."""
 
     def send(self, line: bytes) -> None:
         """Send a line to the other side. Raises OSError."""
@@ -51,12 +56,21 @@ class Connection:
         except OSError as error:
             raise InstrumentError(f"{name}: cannot be reached: {reason(error)}") from None
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._timeout = timeout
+        self._socket.setblocking(False)
 
     def fileno(self) -> int:
-        return self._socket.fileno()  # with a time limit, sockets do not block
+        return self._socket.fileno()
+
+    def read(self, size: int) -> bytes:
+        return self._socket.recv(size)
 
     def send(self, line: bytes) -> None:
-        self._socket.sendall(line)
+        while line:
+            _, free, _ = select.select([], [self._socket], [], self._timeout)
+            if not free:
+                raise TimeoutError("timed out")
+            line = line[self._socket.send(line) :]
 
     def ended(self) -> str:
         return "the connection was closed"
@@ -70,23 +84,21 @@ class SerialPort:
 
     def __init__(self, port: str, speed: int) -> None:
         try:
-            import termios
-
             import serial  # type: ignore[import-untyped]
         except ImportError:
             raise InvalidArgument("serial: needs pyserial: pip install 'stepdiag[serial]'") from None
         self.name = f"serial:{port}"
         try:
             self._port = serial.Serial(port, speed, timeout=0, write_timeout=1.0, exclusive=True)
-            os.set_blocking(self._port.fileno(), False)
-            attributes = termios.tcgetattr(self._port.fileno())
-            attributes[6][termios.VMIN] = 1  # a read without bytes is the end of the port, not a pause
-            termios.tcsetattr(self._port.fileno(), termios.TCSANOW, attributes)
-        except (serial.SerialException, termios.error, OSError, ValueError) as error:
+            self._bytes = of_port(self._port)
+        except (serial.SerialException, OSError, ValueError) as error:
             raise InstrumentError(f"{self.name}: cannot be opened: {error}") from None
 
     def fileno(self) -> int:
-        return int(self._port.fileno())
+        return self._bytes.fileno()
+
+    def read(self, size: int) -> bytes:
+        return self._bytes.read(size)
 
     def send(self, line: bytes) -> None:
         self._port.write(line)
@@ -96,6 +108,7 @@ class SerialPort:
 
     def close(self) -> None:
         self._port.close()
+        self._bytes.close()
 
 
 class ProgramOutput:
@@ -111,7 +124,7 @@ class ProgramOutput:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 bufsize=0,
-                start_new_session=True,  # Ctrl-C is for the acquisition, which ends the program
+                **OWN_GROUP,  # Ctrl-C is for the acquisition, which ends the program
                 env={**os.environ, "PYTHONUNBUFFERED": "1"},  # lines that wait in a buffer are stale
             )
         except (OSError, ValueError) as error:
@@ -120,8 +133,8 @@ class ProgramOutput:
         self._said = b""
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
-        for pipe in (self._output, self._input):
-            os.set_blocking(pipe.fileno(), False)
+        self._bytes = of_pipe(self._output)
+        never_blocks(self._input)
 
     @property
     def _output(self) -> IO[bytes]:
@@ -134,7 +147,10 @@ class ProgramOutput:
         return self._process.stdin
 
     def fileno(self) -> int:
-        return self._output.fileno()
+        return self._bytes.fileno()
+
+    def read(self, size: int) -> bytes:
+        return self._bytes.read(size)
 
     def send(self, line: bytes) -> None:
         if os.write(self._input.fileno(), line) != len(line):
@@ -151,18 +167,8 @@ class ProgramOutput:
         return how + (f"; it said: {' '.join(said[-QUOTED:].split())}" if said else "")
 
     def close(self) -> None:
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            try:
-                os.killpg(self._process.pid, number)  # also where it has ended and left children
-            except ProcessLookupError:
-                break
-            except PermissionError:
-                self._process.send_signal(number)
-            try:
-                self._process.wait(GRACE)
-            except subprocess.TimeoutExpired:
-                continue
-        self._process.wait()
+        end_group(self._process, GRACE)
+        self._bytes.close()
         self._output.close()
         self._input.close()
         self._listener.join(0.5)  # unless a child of its own keeps the pipe
@@ -189,16 +195,16 @@ class LineFeed:
         self._lines = 0
         self._failure: str | None = None
         self._behind: float | None = None  # since when there was always more to read
-        self._wake, self._waker = os.pipe()
+        self._wake, self._waker = socket.socketpair()
         self._thread = threading.Thread(target=self._follow, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """End the thread and close the stream."""
-        os.write(self._waker, b"x")
+        self._waker.send(b"x")
         self._thread.join()
-        os.close(self._wake)
-        os.close(self._waker)
+        self._wake.close()
+        self._waker.close()
         self._stream.close()
 
     def wait(self, timeout: float, is_done: Callable[[], bool], missing: Callable[[], str]) -> None:
@@ -249,7 +255,7 @@ class LineFeed:
             if self._failure is not None:
                 return True
             try:
-                piece = os.read(self._stream.fileno(), PIECE)
+                piece = self._stream.read(PIECE)
             except BlockingIOError:
                 self._behind = None
                 return True

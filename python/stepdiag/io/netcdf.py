@@ -21,6 +21,7 @@ import numpy.typing as npt
 import xarray as xr
 from xarray.backends import NetCDF4DataStore
 
+from stepdiag import platform
 from stepdiag._core import InvalidArgument, __version__, newer_format
 from stepdiag.interruption import at_end, uninterrupted
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
@@ -30,7 +31,6 @@ _FREE_SIZE = 64 * 2**20
 _LARGEST_COMPRESSION = 100
 
 _ROOM = 2**19  # bytes of a file beside its values, at most
-_IN_MEMORY = Path("/dev/shm")
 _CHECKSUM = "sha256"
 _OF_OTHERS = ("history",)  # attributes that other programs add to, as their conventions want
 _LIBRARIES = threading.RLock()  # HDF5 crashes where two threads use it at once
@@ -68,14 +68,18 @@ def _packed(dataset: xr.Dataset, path: Path) -> memoryview:
     crash."""
     # An exception inside of the libraries leaves their locks taken.
     with _LIBRARIES, uninterrupted(), ExitStack() as stack:
+        size = dataset.nbytes + _ROOM
         try:
-            scratch, handle = stack.enter_context(_scratch(_IN_MEMORY, dataset.nbytes + _ROOM))
+            scratch, handle = stack.enter_context(_scratch(platform.memory_folder() or path.parent, size))
         except OSError:
-            scratch, handle = stack.enter_context(_scratch(path.parent, dataset.nbytes + _ROOM))
+            scratch, handle = stack.enter_context(_scratch(path.parent, size))
         file = netCDF4.Dataset(scratch, "w", format="NETCDF4")  # not with memory=, which forgets the variables' order
-        scratch.unlink()
+        if platform.OPEN_FILES_CAN_GO:
+            scratch.unlink()
         dataset.dump_to_store(NetCDF4DataStore(file))  # type: ignore[no-untyped-call]
         file.close()
+        if not platform.OPEN_FILES_CAN_GO:
+            return memoryview(scratch.read_bytes())
         return memoryview(mmap.mmap(handle, 0, access=mmap.ACCESS_READ))
 
 
@@ -84,13 +88,13 @@ def _scratch(folder: Path, size: int) -> Iterator[tuple[Path, int]]:
     """A file of so many bytes and its descriptor. Raises OSError if there is no room."""
     path = folder / f"stepdiag.{secrets.token_hex(8)}"
     with at_end(partial(path.unlink, missing_ok=True)):
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        handle = platform.open_new(path)
         try:
-            os.posix_fallocate(handle, 0, size)
+            platform.reserve(handle, size)
             yield path, handle
         finally:
-            path.unlink(missing_ok=True)
             os.close(handle)
+            path.unlink(missing_ok=True)
 
 
 @contextmanager

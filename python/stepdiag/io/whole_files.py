@@ -2,13 +2,13 @@
 
 import glob
 import os
-import select
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 
+from stepdiag import platform
 from stepdiag._core import InvalidArgument
 from stepdiag.display import visible
 from stepdiag.interruption import at_end, uninterrupted
@@ -68,9 +68,11 @@ def _read(path: Path, size: int) -> bytes:
             raise InvalidArgument(f"{path}: expected a file, got a folder")
         check_input(path)
         # The opening of a pipe without a writer blocks without O_NONBLOCK.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            begun = _first_byte(file.fileno(), path) if stat.S_ISFIFO(mode) else b""
-            os.set_blocking(file.fileno(), True)
+        with open(platform.open_to_read(path), "rb") as file:
+            begun = b""
+            if stat.S_ISFIFO(mode):
+                begun = _first_byte(file.fileno(), path)
+                platform.block(file.fileno())
             return begun + file.read(size - len(begun))
     except InvalidArgument:  # is a ValueError
         raise
@@ -82,9 +84,7 @@ def _first_byte(pipe: int, path: Path) -> bytes:
     """The first byte of a pipe; none if its writer takes its time, or wrote nothing.
 
     Raises InvalidArgument if no program opens the pipe for writing within PATIENCE."""
-    polled = select.poll()
-    polled.register(pipe, select.POLLIN)
-    ready = polled.poll(PATIENCE * 1e3)
+    ready = platform.has_writer(pipe, PATIENCE)
     try:
         first = os.read(pipe, 1)
     except BlockingIOError:
@@ -132,21 +132,22 @@ def _whole_file(path: Path) -> Iterator[int]:
     with at_end(partial(_remove, temporary)):
         try:
             with uninterrupted():
-                handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+                handle = platform.open_new(temporary)
             yield handle
             with uninterrupted():
-                os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
+                platform.keep_mode(handle, target)
                 os.fsync(handle)
-                os.replace(temporary, target)
-                sync_folder(target.parent)
+                written, handle = handle, -1
+                os.close(written)
+                platform.replace(temporary, target)
+                platform.sync_folder(target.parent)
         except BaseException as error:
+            if handle >= 0:
+                os.close(handle)
             _remove(temporary)
             if isinstance(error, OSError):
                 raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
             raise
-        finally:
-            if handle >= 0:
-                os.close(handle)
 
 
 def _write_all(handle: int, content: str | bytes | memoryview) -> None:
@@ -173,20 +174,11 @@ def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLi
         write(path)
 
 
-def sync_folder(folder: Path) -> None:
-    """Sync a folder, so that the name of a new file survives a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
 def check_output(path: Path) -> None:
     """Raise InvalidArgument if `path` cannot be written. To be called before the work."""
     folder = path.parent
-    if _is_device_name(path):
-        raise InvalidArgument(f"{path}: cannot be written: expected the name of a file, got one under /dev")
+    if platform.is_device_name(path):
+        raise InvalidArgument(f"{path}: cannot be written: expected the name of a file, got that of a device")
     if not folder.is_dir():
         raise InvalidArgument(f"{path}: cannot be written: the folder {folder} does not exist")
     try:
@@ -214,12 +206,6 @@ def _check_not_read_only(path: Path) -> None:
         )
 
 
-def _is_device_name(path: Path) -> bool:
-    # Do not resolve: /dev/stdout may lead to a file, and renaming would replace the link.
-    name = os.path.abspath(path)
-    return name.startswith("/dev/") and not name.startswith("/dev/shm/")  # a file system in memory
-
-
 def make_folder(path: Path) -> None:
     """Make a folder and its parents."""
     try:
@@ -230,9 +216,3 @@ def make_folder(path: Path) -> None:
 
 def reason(error: Exception) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -1,7 +1,6 @@
 """The one LinuxCNC that can run on a computer: a lock, a check for others, and clean-up."""
 
 import contextlib
-import fcntl
 import os
 import signal
 import subprocess
@@ -9,6 +8,8 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+from stepdiag.platform import KILL, lock
 
 # Keys of shared memory: LinuxCNC's task (linuxcnc.nml), motion, HAL, RTAPI and their clients.
 SHARED_MEMORY = {1001, 1002, 1003, 1004, 1005, 100, 0x48414C32, 0x90280A48, 0x48484C34}
@@ -32,14 +33,14 @@ def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
     path = Path(tempfile.gettempdir()) / "stepdiag-linuxcnc.lock"
     with contextlib.suppress(FileExistsError):
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)  # also for another user's file
+    descriptor = os.open(path, os.O_RDONLY)  # also for another user's file
     try:
         end = time.monotonic() + timeout
         while True:
             try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock(descriptor)
                 break
-            except BlockingIOError:
+            except OSError:
                 if time.monotonic() > end:
                     raise LinuxcncError(f"{path}: still held by another run of LinuxCNC after {timeout:g} s") from None
                 time.sleep(0.05)
@@ -105,7 +106,7 @@ def of_sessions(folder: str) -> list[int]:
     return found
 
 
-def end_processes(numbers: list[int], sign: signal.Signals = signal.SIGKILL) -> None:
+def end_processes(numbers: list[int], sign: signal.Signals = KILL) -> None:
     for number in numbers:
         with contextlib.suppress(OSError):
             os.kill(number, sign)
@@ -120,7 +121,7 @@ def end_all_of(folder: str, environment: Mapping[str, str]) -> None:
         if of_sessions(folder) or any(name == "rtapi_app" for _, name in processes()):
             subprocess.run(["halrun", "-U"], env=environment, stdin=subprocess.DEVNULL,
                            capture_output=True, timeout=20, cwd="/")  # fmt: skip
-    for sign in (signal.SIGTERM, signal.SIGKILL):
+    for sign in (signal.SIGTERM, KILL):
         left = of_sessions(folder)
         end_processes(left, sign)
         if left:

@@ -12,7 +12,6 @@ computer; a lock enforces this.
 import contextlib
 import os
 import shutil
-import signal
 import socket
 import subprocess
 import tempfile
@@ -25,6 +24,7 @@ from typing import Any, Self
 from stepdiag.linuxcnc.configuration import MachineConfiguration, copy_configuration, write_configuration
 from stepdiag.linuxcnc.processes import LinuxcncError, end_all_of, linuxcnc_lock, refuse_a_running_one
 from stepdiag.linuxcnc.requests import LinuxcncRequests
+from stepdiag.platform import NO_LINUXCNC, end_group, is_administrator
 
 PYTHON = "/usr/bin/python3"
 PACKAGES = ("linuxcnc-uspace", "linuxcnc-uspace-dev")
@@ -104,6 +104,8 @@ class LinuxcncSession(LinuxcncRequests):
 
     # --- start and end ---
     def __enter__(self) -> Self:
+        if NO_LINUXCNC:
+            raise LinuxcncError(NO_LINUXCNC)
         if missing := missing_programs():
             raise LinuxcncError(f"LinuxCNC is not installed ({', '.join(missing)} missing): "
                                 f"apt-get install {' '.join(PACKAGES)}")  # fmt: skip
@@ -141,7 +143,7 @@ class LinuxcncSession(LinuxcncRequests):
         else:
             ini = copy_configuration(self.folder, self._configuration, "./display")
         self._write_display()
-        self.folder.chmod(0o1777 if os.geteuid() == 0 else 0o755)  # for another user's process
+        self.folder.chmod(0o1777 if is_administrator() else 0o755)  # for another user's process
 
         socket_path = self.folder / "session"
         listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
@@ -185,7 +187,7 @@ class LinuxcncSession(LinuxcncRequests):
             "HOME": str(self.folder),  # LinuxCNC writes files there
             "LANG": "C.UTF-8",
         }
-        if os.geteuid() == 0:  # LinuxCNC's real-time process refuses to run as root
+        if is_administrator():  # LinuxCNC's real-time process refuses to run as root
             environment["RTAPI_UID"] = str(NOBODY)
         return environment
 
@@ -235,12 +237,7 @@ class LinuxcncSession(LinuxcncRequests):
     def _end_processes(self) -> None:
         """End the processes left by a crash or a hang; after an orderly end there are none."""
         if self._process.poll() is None:
-            for sign, patience in ((signal.SIGTERM, 8.0), (signal.SIGKILL, 5.0)):
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(self._process.pid, sign)
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    self._process.wait(patience)
-                    break
+            end_group(self._process, patience=8.0)
         end_all_of(str(self.folder), self._environment)
 
     def _keep_log(self) -> None:

@@ -12,9 +12,7 @@ Dask is an optional dependency and imported on first use.
 import ipaddress
 import logging
 import os
-import re
 import shutil
-import signal
 import sys
 import threading
 import time
@@ -23,13 +21,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from multiprocessing import resource_tracker
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from stepdiag import _core
 from stepdiag._core import Bins, InvalidArgument, PartialStatistics
-from stepdiag.interruption import at_end, kill_descendants
+from stepdiag.interruption import at_end
+from stepdiag.platform import deaf_to_interruption, kill_descendants, semaphores_of_this_process
 from stepdiag.uncertainty.model_source import ModelSource, model_of
 from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 from stepdiag.wrong_arguments import checked
@@ -278,15 +276,11 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
 
 @contextmanager
 def _own_loop(distributed: Any) -> Iterator[Any]:
-    """Dask's event loop. What it starts does not hear Ctrl-C, which is meant for this program, from its first
-    instruction on: a process has the blocked signals of the thread that starts it, and a thread those of its maker."""
+    """Dask's event loop. What it starts does not hear Ctrl-C, which is meant for this program."""
     runner = distributed.utils.LoopRunner()
     resource_tracker.ensure_running()  # the first call unblocks the signal for its thread
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
+    with deaf_to_interruption():
         runner.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:
         yield runner.loop
     finally:
@@ -304,13 +298,9 @@ def _abandon(loop: Any) -> None:
     loop.add_callback(park)
     parked.wait(PARK_SECONDS)
     kill_descendants()
-    # Semaphores, which multiprocessing removes where processes end in order: those that this process has mapped.
-    maps = Path("/proc/self/maps").read_text(errors="replace")
-    inodes = set(re.findall(r" (\d+) +/dev/shm/sem\.", maps))
-    for path in Path("/dev/shm").glob("sem.mp-*"):
+    for path in semaphores_of_this_process():
         with suppress(OSError):
-            if str(path.stat().st_ino) in inodes:
-                path.unlink()
+            path.unlink()
 
 
 def check_scheduler(address: str) -> str:

@@ -16,7 +16,8 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.interruption import uninterrupted
 from stepdiag.io.outputs import CELLS, claim
-from stepdiag.io.whole_files import read_text, reason, sync_folder
+from stepdiag.io.whole_files import read_text, reason
+from stepdiag.platform import sync_folder
 from stepdiag.scenario.packed import pack_scenario
 from stepdiag.uncertainty.dask_workers import Workers
 from stepdiag.uncertainty.study_cell import CellJob, CellResult, compute_cell

@@ -62,6 +62,9 @@ class Pipe:
     def fileno(self) -> int:
         return self._end
 
+    def read(self, size: int) -> bytes:
+        return os.read(self._end, size)
+
     def send(self, line: bytes) -> None:
         self.sent.append(line)
 

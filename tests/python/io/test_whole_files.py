@@ -11,9 +11,8 @@ import pytest
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag import InvalidArgument
+from stepdiag import InvalidArgument, platform
 from stepdiag.cli import main
-from stepdiag.io import netcdf, whole_files
 
 # The command stops where its temporary file is on the disk, and says so.
 STOPPED = """
@@ -111,11 +110,11 @@ def test_the_folder_is_synced_after_the_renaming(scenario: Path, monkeypatch: py
     """Of what the core writes, the core syncs it: tests/faults has each of its calls fail."""
     synced = []
 
-    def sync(folder: Path, to: Callable[[Path], None] = whole_files.sync_folder) -> None:
+    def sync(folder: Path, to: Callable[[Path], None] = platform.sync_folder) -> None:
         to(folder)
         synced.append((folder, sorted(os.listdir(folder))))
 
-    monkeypatch.setattr(whole_files, "sync_folder", sync)
+    monkeypatch.setattr(platform, "sync_folder", sync)
     assert main(["simulate", "scenario.toml", "-o", "run.nc"]) == 0
     assert synced == [(scenario.parent, ["run.nc", "scenario.toml"])]
 
@@ -125,7 +124,7 @@ def test_netcdf_is_made_elsewhere_and_leaves_nothing_there(
     scenario: Path, folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The libraries do not write to the disk of the output, where they could crash, unless there is no room."""
-    monkeypatch.setattr(netcdf, "_IN_MEMORY", Path(folder))
+    monkeypatch.setattr(platform, "memory_folder", lambda: Path(folder))
     assert main(["simulate", "scenario.toml", "-o", "run.nc"]) == 0
     assert sorted(contents(scenario.parent)) == ["run.nc", "scenario.toml"]
     assert len(sd.read_measurement(scenario.with_name("run.nc")).line) == 70

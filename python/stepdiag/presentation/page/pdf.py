@@ -1,6 +1,5 @@
 """A page as PDF, printed by Chromium without a screen."""
 
-import os
 import shutil
 import subprocess
 import tempfile
@@ -9,8 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from stepdiag._core import InvalidArgument
-from stepdiag.interruption import at_end, kill_descendants
+from stepdiag.interruption import at_end
 from stepdiag.io.whole_files import write_whole
+from stepdiag.platform import is_administrator, kill_descendants
 
 BROWSERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 LONGEST: Final = 120  # seconds; a page takes a few
@@ -47,7 +47,7 @@ def write_pdf(page: str, path: Path) -> None:
             "--no-pdf-header-footer",
             f"--virtual-time-budget={BUDGET}",
             f"--print-to-pdf={printed}",
-            *(["--no-sandbox"] if os.geteuid() == 0 else []),
+            *(["--no-sandbox"] if is_administrator() else []),
             f"{source.as_uri()}#print",
         ]
         try:
