@@ -59,7 +59,7 @@ constexpr const char* answers_file = "compensator.csv";
 constexpr const char* chain_of_table = "[w Y' b X Z t]";
 
 Rows compensator(const fs::path& known) {
-    const auto compensator = Compensator::load(known / table_file, chain_of_table);
+    const auto compensator = Compensator::load((known / table_file).string(), chain_of_table);
     std::ifstream file(known / answers_file);
     std::string line;
     std::getline(file, line);  // names of the columns
@@ -103,7 +103,7 @@ Rows refusals(const fs::path& known) {
     damaged.erase(damaged.rfind(",urad") - 1, 1);
     return {refusal("a digit less in the last row", "sha256", [&] { parse_parameter_table(damaged, table_file); }),
             refusal("the chain of another machine", "chain",
-                    [&] { Compensator::load(known / table_file, "[w X' b Y Z t]"); })};
+                    [&] { Compensator::load((known / table_file).string(), "[w X' b Y Z t]"); })};
 }
 
 #ifdef STEPDIAG_WHOLE_LIBRARY
@@ -118,12 +118,12 @@ struct KnownRun {
 };
 
 Rows run(const fs::path& known, const KnownRun& one) {
-    const ErrorMap truth = read_error_map(known / one.file("truth.csv"));
+    const ErrorMap truth = read_error_map((known / one.file("truth.csv")).string());
     const Plan plan(one.volume, {Line::parse("ppp"), Line::parse("npp"), Line::parse("pnp"), Line::parse("nnp")},
                     one.steps, all_axes, {Line::parse("p00"), Line::parse("0p0"), Line::parse("00p")});
-    const Calibration found =
-        adjust(read_measurement(known / one.file("measurement.csv")), plan, Chain::parse(one.chain), one.tool, {})
-            .calibration;
+    const Calibration found = adjust(read_measurement((known / one.file("measurement.csv")).string()), plan,
+                                     Chain::parse(one.chain), one.tool, {})
+                                  .calibration;
     double length = 0.0, angle = 0.0;  // what is not determined has no deviation that is allowed
     for (int i = 0; i < function_count; ++i) {
         const FunctionId id = FunctionId::at(i);
@@ -191,7 +191,7 @@ int selftest(const fs::path& known) {
             if (!fs::is_regular_file(known / file)) throw InvalidArgument("no file " + (known / file).string());
 
     std::printf("program          %s\nlibrary          stepdiag %s\ninstruction set  %s\nknown truth      %s\n\n",
-                program, version(), instruction_set().c_str(), known.c_str());
+                program, version(), instruction_set().c_str(), known.string().c_str());
     std::printf("result  case            compared                       deviation  allowed  unit  truth\n");
     int count = 0, passed = 0, last_source = none;
     for (const Case& one : cases)
