@@ -37,7 +37,8 @@ def main(wheel: Path, source: Path, folder: Path) -> None:
 
     zig = Path(ziglang.__file__).parent / "zig"
     subprocess.run(
-        [zig, "dlltool", "-m", "i386:x86-64", "-d", definition, "-l", folder / "libs" / f"{library.stem}.lib"], check=True
+        [zig, "dlltool", "-m", "i386:x86-64", "-d", definition, "-l", folder / "libs" / f"{library.stem}.lib"],
+        check=True,
     )
 
 
