@@ -29,7 +29,7 @@ def main(wheel: Path, source: Path, folder: Path) -> None:
     shutil.copy(found, folder / "include" / "pyconfig.h")
     (library,) = [one for one in folder.glob("python3*.dll") if one.stem != "python3"]
     exported = pefile.PE(str(library)).DIRECTORY_ENTRY_EXPORT.symbols
-    names = [one.name.decode() for one in exported if one.name]
+    names = [one.name.decode() for one in exported if one.name and one.name.lstrip(b"_").startswith(b"Py")]
     definition = folder / f"{library.stem}.def"
     definition.write_text("\n".join([f"LIBRARY {library.name}", "EXPORTS", *names]) + "\n")
     (folder / "libs").mkdir()

@@ -23,7 +23,7 @@ def main(extension: Path, library: Path, licences: Path) -> None:
         folder = Path(name)
         metadata = folder / prepare_metadata_for_build_wheel(name)
         lines = (metadata / "WHEEL").read_text().splitlines()
-        kept = [line for line in lines if not line.startswith("Tag:")]
+        kept = [line for line in lines if line and not line.startswith("Tag:")]
         (metadata / "WHEEL").write_text("\n".join([*kept, f"Tag: {tag[0]}-{tag[0]}-{tag[1]}"]) + "\n")
         listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "python/stepdiag"]
         for file in subprocess.run(listed, cwd=ROOT, capture_output=True, check=True, text=True).stdout.split("\0"):

@@ -82,7 +82,7 @@ Rows compensator(const fs::path& known) {
     if (positions == 0) error = rotation = nan;
     const std::string of_all = ", " + std::to_string(positions) + " positions";
     // No large numbers are subtracted: errors of 0.1 mm, sums of a dozen products.
-    return {{"compensator", "errors" + of_all, digits_40, error, 2e-16, "mm"},
+    return {{"compensator", "errors" + of_all, digits_40, error, 3e-16, "mm"},
             {"compensator", "rotations" + of_all, digits_40, rotation, 1e-18, "rad"}};
 }
 
