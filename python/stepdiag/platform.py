@@ -182,7 +182,8 @@ if sys.platform == "win32":
     def lock(handle: int) -> None:
         """Lock an open file against other processes, until it is closed. Raises OSError if another one has it."""
         size = os.lseek(handle, 0, os.SEEK_END)
-        os.lseek(handle, 2**62, os.SEEK_SET)  # beyond the end: Windows lets nobody else read what is locked
+        # Beyond the end, where Windows lets nobody else read what is locked, and within the 31 bits of _locking.
+        os.lseek(handle, 2**30, os.SEEK_SET)
         try:
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
         finally:
