@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ import xarray as xr
 from small_scenario import SCENARIO
 
 import stepdiag as sd
+from stepdiag import platform
 from stepdiag.cli import main
-from stepdiag.io import whole_files as files
 from stepdiag.progress import Progress
 from stepdiag.uncertainty import write as uncertainty_write
 from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
@@ -208,12 +209,12 @@ def ctrl_c(*_: Any) -> None:
 @pytest.mark.parametrize(
     ("failure", "status", "said"), [(disk_full, 2, "No space left on device"), (ctrl_c, 130, "interrupted")]
 )
-@pytest.mark.parametrize("where", ["fsync", "replace", "sync_folder"])
+@pytest.mark.parametrize("where", [(os, "fsync"), (platform, "replace"), (platform, "sync_folder")])
 def test_result_that_cannot_be_written_leaves_the_checkpoint(
     folder: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    where: str,
+    where: tuple[ModuleType, str],
     failure: Callable[..., None],
     status: int,
     said: str,
@@ -223,7 +224,7 @@ def test_result_that_cannot_be_written_leaves_the_checkpoint(
     with monkeypatch.context() as patched:
 
         def write(*arguments: Any) -> None:
-            patched.setattr(files.os if where != "sync_folder" else files, where, failure)
+            patched.setattr(*where, failure)
             written(*arguments)
 
         written = uncertainty_write.write_uncertainty
@@ -240,14 +241,14 @@ def test_result_that_cannot_be_written_leaves_the_checkpoint(
 def test_result_is_on_the_disk_before_the_checkpoint_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     events: list[tuple[str, str]] = []
 
-    def synced(to: Callable[[Path], None] = files.sync_folder) -> Callable[[Path], None]:
+    def synced(to: Callable[[Path], None] = platform.sync_folder) -> Callable[[Path], None]:
         return lambda path: (to(path), events.append(("synced", ",".join(sorted(p.name for p in path.iterdir())))))[0]
 
     def unlinked(path: Path, missing_ok: bool = False, to: Any = Path.unlink) -> None:
         to(path, missing_ok=missing_ok)
         events.append(("removed", path.name))
 
-    monkeypatch.setattr(files, "sync_folder", synced())
+    monkeypatch.setattr(platform, "sync_folder", synced())
     monkeypatch.setattr(Path, "unlink", unlinked)
     assert run("-n", SAMPLES, "-o", "u.csv") == 0
     assert events[-2:] == [("synced", "scenario.toml,u.csv,u.csv.checkpoint"), ("removed", "u.csv.checkpoint")]

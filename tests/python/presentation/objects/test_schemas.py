@@ -19,6 +19,7 @@ OF_UNIT_ONE = {
     "chi_square",
     "chi_square_gain",
     "chi_square_probability",
+    *("chi_square_turned", "chi_square_without"),
     "determined",
     "fit_chi_square",
     "fit_probability",
