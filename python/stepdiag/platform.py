@@ -36,15 +36,6 @@ def quiet_environment() -> dict[str, str]:
     return {**os.environ, "NO_COLOR": "1", "PYTHONUNBUFFERED": "1", "PYTHONUTF8": "1"}
 
 
-def descendants() -> list[int]:
-    """The processes that this one has started, and theirs; what started last is first."""
-    parents = dict(_parents())
-    ours = {os.getpid()}
-    while more := {child for child, parent in parents.items() if parent in ours} - ours:
-        ours |= more
-    return sorted(ours - {os.getpid()}, reverse=True)
-
-
 def kill_descendants() -> None:
     """Kill the workers, browsers and other programs that this process has started, and theirs."""
     # multiprocessing's tracker was first: processes that miss it start another.
@@ -87,6 +78,8 @@ if sys.platform == "win32":
     import msvcrt
     from ctypes import wintypes
 
+    import psutil
+
     SIGNALS: Final = (signal.SIGINT, signal.SIGBREAK)  # Ctrl-C; Ctrl-Break, and what `interrupt` sends
     KILL: Final = signal.SIGTERM  # ends a process at once
     OWN_GROUP: Final[dict[str, Any]] = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -114,14 +107,7 @@ if sys.platform == "win32":
             os.kill(process, signal.CTRL_BREAK_EVENT)
 
     def is_running(process: int) -> bool:
-        """Whether there is a process of this number that we may ask."""
-        handle = _KERNEL.OpenProcess(0x1000, False, process)  # PROCESS_QUERY_LIMITED_INFORMATION
-        if not handle:
-            return False
-        status = wintypes.DWORD()
-        known = _KERNEL.GetExitCodeProcess(handle, ctypes.byref(status))
-        _KERNEL.CloseHandle(handle)
-        return bool(known) and status.value == 259  # STILL_ACTIVE
+        return bool(psutil.pid_exists(process))
 
     def end_group(process: "subprocess.Popen[bytes]", patience: float) -> None:
         """End a process of an OWN_GROUP and its children."""
@@ -132,9 +118,12 @@ if sys.platform == "win32":
             process.kill()
         process.wait()
 
-    def _parents() -> Iterator[tuple[int, int]]:
-        """None: Windows gives the number of a parent that has ended to another process, whose children are not ours."""
-        yield from ()
+    def descendants() -> list[int]:
+        """The processes that this one has started, and theirs.
+
+        Windows gives the number of a process that has ended to another one, whose children are not ours: psutil knows
+        that a child is younger than its parent."""
+        return [child.pid for child in reversed(psutil.Process().children(recursive=True))]
 
     def _forget(child: int) -> None:
         pass
@@ -260,6 +249,14 @@ else:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(patience)
         process.wait()
+
+    def descendants() -> list[int]:
+        """The processes that this one has started, and theirs; what started last is first."""
+        parents = dict(_parents())
+        ours = {os.getpid()}
+        while more := {child for child, parent in parents.items() if parent in ours} - ours:
+            ours |= more
+        return sorted(ours - {os.getpid()}, reverse=True)
 
     def _parents() -> Iterator[tuple[int, int]]:
         with suppress(OSError):

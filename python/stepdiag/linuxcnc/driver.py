@@ -44,7 +44,7 @@ class Driver:
     def end_if_alone(self) -> None:
         """Exit if the session is gone, for example after a crash. This ends LinuxCNC."""
         try:
-            if not self.connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT):
+            if not self.connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT):  # type: ignore[attr-defined, unused-ignore]  # not on Windows
                 sys.exit(1)
         except BlockingIOError:
             pass
@@ -301,7 +301,7 @@ def serve(connection: socket.socket) -> None:
 
 
 if __name__ == "__main__":
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as to_session:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as to_session:  # type: ignore[attr-defined, unused-ignore]  # not on Windows
         to_session.connect(os.environ["STEPDIAG_SESSION_SOCKET"])
         with contextlib.suppress(OSError, KeyboardInterrupt):  # the session is gone
             serve(to_session)

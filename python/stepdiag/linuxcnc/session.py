@@ -146,7 +146,7 @@ class LinuxcncSession(LinuxcncRequests):
         self.folder.chmod(0o1777 if is_administrator() else 0o755)  # for another user's process
 
         socket_path = self.folder / "session"
-        listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+        listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))  # type: ignore[attr-defined, unused-ignore]  # not on Windows
         listener.bind(str(socket_path))
         listener.listen(1)
         self._environment = self._make_environment(socket_path)

@@ -1,7 +1,6 @@
 """The command line: files in, files out, exit codes, and one clear line for a caller's mistake."""
 
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -249,6 +248,7 @@ def test_terminal_without_the_micro_sign_gets_its_report(here: Path) -> None:
 # --- whole or not at all ---------------------------------------------------------------------------------------------
 def limit_files(size: int) -> Callable[[], None]:
     """For a child process: writing more than `size` bytes to a file fails, as on a full disk."""
+    resource = pytest.importorskip("resource")
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 

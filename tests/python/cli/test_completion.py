@@ -1,7 +1,6 @@
 """Completion in interactive shells, as docs/terminal.md sets it up."""
 
 import os
-import pty
 import re
 import select
 import shutil
@@ -14,6 +13,7 @@ import pytest
 from places import DOCS
 from terminals import needs_terminal
 
+pty = pytest.importorskip("pty")  # not on Windows
 pytestmark = needs_terminal
 
 SHELLS = {

@@ -1,7 +1,6 @@
 """The commands check and init: distinguishing files, and beginning with new ones."""
 
 import os
-import pty
 import re
 import subprocess
 import sys
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from small_scenario import SCENARIO, of_map
+from terminals import needs_terminal
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -198,9 +198,10 @@ def test_init_refuses(here: Path, capsys: pytest.CaptureFixture[str], words: lis
     assert not Path("machine").exists()
 
 
+@needs_terminal
 def test_init_asks_on_a_terminal(here: Path) -> None:
     """A pseudo-terminal, at which a person answers; Enter takes what is offered."""
-    ours, theirs = pty.openpty()
+    ours, theirs = os.openpty()
     command = [sys.executable, "-m", "stepdiag", "init", "-o", "machine", "--steps", "3"]
     with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs) as process:
         os.write(ours, b"400\n\n250\n\npsd\n")

@@ -2,7 +2,6 @@
 
 import io
 import os
-import pty
 import re
 import select
 import subprocess
@@ -152,7 +151,7 @@ def test_sentence_fits_the_terminal_and_a_table_stays(monkeypatch: pytest.Monkey
 
 def in_terminal(*arguments: str) -> str:
     """What a command writes to a real terminal."""
-    master, slave = pty.openpty()
+    master, slave = os.openpty()
     environment = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
     process = subprocess.Popen(
         [sys.executable, "-m", "stepdiag", *arguments], stdout=slave, stderr=slave, env=environment | {"TERM": "xterm"}

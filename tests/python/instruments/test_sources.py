@@ -3,7 +3,6 @@
 import itertools
 import json
 import os
-import pty
 import socket
 import threading
 import time
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from acquiring import Listener, fast, scenario
+from terminals import needs_terminal
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import acquire, instrument_of
@@ -78,10 +78,11 @@ def adapter(header: dict[str, object], sample: Callable[[], dict[str, object]]) 
         thread.join(5.0)
 
 
+@needs_terminal
 def test_serial_port_gives_lines_as_a_socket_does(tmp_path: Path) -> None:
     """A device on a serial line; a pseudo-terminal here. It may send a part of a line first."""
     described = scenario(plan='lines = ["ppp"]\nsteps = 1', head=IDEAL)
-    ours, theirs = pty.openpty()
+    ours, theirs = os.openpty()
     ended = threading.Event()
     with Twin(described, protocol="lines") as twin:
         names = [column.name for column in twin.instrument.columns]
