@@ -2,11 +2,15 @@
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+# That of another system, under Wine: cross/test_windows.
+PROGRAM = shlex.split(os.environ.get("STEPDIAG_PROGRAM", "")) or [sys.executable, "-m", "stepdiag"]
 
 
 class Running:
@@ -14,8 +18,10 @@ class Running:
 
     def __init__(self, book: Path) -> None:
         start = time.monotonic()
-        command = [sys.executable, "-m", "stepdiag", "app", str(book), "--no-browser"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "TZ": "UTC"})
+        command = [*PROGRAM, "app", str(book), "--no-browser"]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True, env={**os.environ, "TZ": "UTC"}
+        )
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
         self.took = time.monotonic() - start
