@@ -1,0 +1,17 @@
+# CMake's description of libcsv, whose own is older than ARM64 and knows no Windows.
+cmake_minimum_required(VERSION 3.25)
+project(libcsv LANGUAGES C)
+add_library(csv SHARED libcsv.c)
+if(WIN32)
+  file(READ csv.h header)
+  string(REGEX MATCHALL "csv_[a-z0-9_]+\\(" names "${header}") # and nothing of the compiler's own
+  list(TRANSFORM names REPLACE "\\(" "")
+  list(REMOVE_DUPLICATES names)
+  list(JOIN names "\n" names)
+  file(WRITE "${PROJECT_BINARY_DIR}/csv.def" "EXPORTS\n${names}\n")
+  target_sources(csv PRIVATE "${PROJECT_BINARY_DIR}/csv.def")
+else()
+  set_target_properties(csv PROPERTIES SOVERSION 3)
+endif()
+install(TARGETS csv)
+install(FILES csv.h TYPE INCLUDE)
