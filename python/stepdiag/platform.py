@@ -4,6 +4,7 @@ Linux and Windows. No other module asks which system this is (tests/python/test_
 """
 
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -11,7 +12,7 @@ import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
 from typing import IO, Any, Final
@@ -145,6 +146,14 @@ if sys.platform == "win32":
 
     def is_administrator() -> bool:
         return False  # nothing differs for one
+
+    def command_line(words: Sequence[str]) -> str:
+        """As a person types it."""
+        return subprocess.list2cmdline(words)
+
+    def words_of(line: str) -> list[str]:
+        """Of a command as a person types it. Raises ValueError for a quotation without an end."""
+        return [word.strip('"') for word in shlex.split(line, posix=False)]
 
     def lock(handle: int) -> None:
         """Lock an open file against other processes, until it is closed. Raises OSError if another one has it."""
@@ -334,6 +343,14 @@ else:
 
     def is_administrator() -> bool:
         return os.geteuid() == 0
+
+    def command_line(words: Sequence[str]) -> str:
+        """As a person types it."""
+        return shlex.join(words)
+
+    def words_of(line: str) -> list[str]:
+        """Of a command as a person types it. Raises ValueError for a quotation without an end."""
+        return shlex.split(line)
 
     def lock(handle: int) -> None:
         """Lock an open file against other processes, until it is closed. Raises OSError if another one has it."""

@@ -1,6 +1,5 @@
 """What all screens have: the frame of a page, and how numbers, days and verdicts look."""
 
-import shlex
 from collections.abc import Sequence
 from datetime import date
 from importlib.resources import files
@@ -13,6 +12,7 @@ from stepdiag._core import __version__
 from stepdiag.book.book import Entry
 from stepdiag.book.facts import CalibrationFacts
 from stepdiag.book.trend import Trend
+from stepdiag.platform import command_line
 from stepdiag.presentation.page.html import Markup, element, markup
 from stepdiag.presentation.page.preview import ticks
 from stepdiag.style import COLOUR
@@ -56,7 +56,7 @@ def page(
         element("main", element("h1", title), *content, id="main"),
         element(
             "footer",
-            element("p", "On the command line: ", element("code", shlex.join(("stepdiag", *command))))
+            element("p", "On the command line: ", element("code", command_line(("stepdiag", *command))))
             if command
             else None,
             element("p", f"stepdiag {__version__}"),

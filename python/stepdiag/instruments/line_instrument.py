@@ -5,7 +5,6 @@ docs/acquisition.md has the protocol.
 
 import ipaddress
 import json
-import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
@@ -19,6 +18,7 @@ from stepdiag.instruments.ids3010_messages import shown
 from stepdiag.instruments.instrument import InstrumentError, ReadColumn, Sample, columns_of_signals
 from stepdiag.instruments.line_streams import BAUD, Connection, LineFeed, ProgramOutput, SerialPort, Stream
 from stepdiag.io.whole_files import reason
+from stepdiag.platform import words_of
 from stepdiag.scenario.known import Known
 
 VERSION: Final = 1
@@ -299,7 +299,7 @@ def line_instrument(
         )
     if kind == "program":
         try:
-            arguments = shlex.split(rest)
+            arguments = words_of(rest)
         except ValueError as error:
             raise InvalidArgument(f"source: {rest[:100]!r}: {error}") from None
         if not arguments:

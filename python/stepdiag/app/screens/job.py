@@ -1,11 +1,10 @@
 """What a command does at the moment, what it said, and the way on."""
 
-import shlex
-
 from starlette.responses import HTMLResponse
 
 from stepdiag.app.frame import action, address, banner, page
 from stepdiag.app.jobs import CommandJob
+from stepdiag.platform import command_line
 from stepdiag.presentation.page.html import Markup, element
 
 
@@ -35,7 +34,7 @@ def job_screen(job: CommandJob) -> HTMLResponse:
         state = [banner("undecided", "Stopped", element("p", "Nothing was changed by the step that was stopped."))]
     else:
         state = [banner("damaged", "Not done", *(element("p", line) for line in job.said[-3:]))]
-    commands = [element("li", element("code", shlex.join(("stepdiag", *words)))) for words in job.commands]
+    commands = [element("li", element("code", command_line(("stepdiag", *words)))) for words in job.commands]
     return page(
         job.title,
         *state,

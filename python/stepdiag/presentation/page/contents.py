@@ -1,7 +1,6 @@
 """What a report is made from: read, and checked to belong together."""
 
 import hashlib
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,7 @@ from stepdiag.io.adjustment_read import FitDetails, details_of, read_fit_details
 from stepdiag.io.data_files import date_of_today, read_calibration, read_measurement
 from stepdiag.io.whole_files import check_input, read_bytes
 from stepdiag.parameters import in_report_units, kind_of, units_of
+from stepdiag.platform import command_line
 from stepdiag.presentation.page.budget import Budget, read_budget
 from stepdiag.presentation.page.header import ReportHeader, header_of
 from stepdiag.scenario.description import read_scenario
@@ -53,7 +53,7 @@ class ReportRequest:
         for name, text in self.words.items():
             words += [] if text is None else [f"--{name.replace('_', '-')}", text]
         words += [] if self.language == "en" else ["--language", self.language]
-        return shlex.join([*words, "-o", output.name])
+        return command_line([*words, "-o", output.name])
 
     @property
     def inputs(self) -> list[Path]:

@@ -1,7 +1,6 @@
 """The parts of a report that are words: verdict, summary, what is open, method, provenance, commands."""
 
 import math
-import shlex
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -11,6 +10,7 @@ from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.findings.meaning import PROVENANCE, UNVERIFIED, fit_words, headline, is_valid
 from stepdiag.findings.temperature import temperature_text
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units
+from stepdiag.platform import command_line
 from stepdiag.presentation.blocks import NoteBlock
 from stepdiag.presentation.comparison import comparison_blocks
 from stepdiag.presentation.fit import fit_blocks
@@ -318,10 +318,10 @@ def commands_section(contents: Contents, command: str) -> Markup:
     """The commands that repeat all of it."""
     request, method = contents.request, contents.calibration.method
     scenario, run = (
-        shlex.quote(path.name) if path else name
+        command_line([path.name]) if path else name
         for path, name in ((request.scenario, "SCENARIO"), (request.run, "RUN"))
     )
-    calibration = shlex.quote(request.calibration.name)
+    calibration = command_line([request.calibration.name])
     option = "" if method in ("adjustment", "") else f" -m {method}"
     covariance = " --covariance" if contents.calibration.covariance is not None else ""
     lines = [
