@@ -12,6 +12,8 @@ from small_scenario import SCENARIO
 from stepdiag.cli import main
 from stepdiag.interruption import uninterrupted
 
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to consoles, not to processes")
+
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 LINE = {signal.SIGINT: "stepdiag: interrupted", signal.SIGTERM: "stepdiag: terminated"}
 # A command that says where it is, and stays there: `stop` takes the place of a function.

@@ -5,7 +5,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -192,7 +192,8 @@ def instrument(answer: Answer) -> Iterator[tuple[str, int]]:
         yield server.getsockname()[:2]
     finally:
         ended.set()
-        server.shutdown(socket.SHUT_RDWR)
+        with suppress(OSError):  # Windows: it is not connected; to close it is enough
+            server.shutdown(socket.SHUT_RDWR)
         server.close()
         for client in clients:
             client.close()
