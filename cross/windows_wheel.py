@@ -33,8 +33,6 @@ def main(extension: Path, library: Path, licences: Path) -> None:
                 shutil.copy(ROOT / file, place)
         shutil.copy(extension, folder / "stepdiag" / extension.name)
         shutil.copy(library, folder / "stepdiag")  # where Windows looks for what an extension links
-        if not licences.is_dir():
-            sys.exit(f"{licences}: missing: run ./run wheel first, which collects the licences of what is inside")
         shutil.copytree(licences, metadata / "licenses", dirs_exist_ok=True)
         (ROOT / "dist").mkdir(exist_ok=True)
         subprocess.run([sys.executable, "-m", "wheel", "pack", name, "-d", str(ROOT / "dist")], check=True)

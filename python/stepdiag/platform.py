@@ -4,7 +4,6 @@ Linux and Windows. No other module asks which system this is (tests/python/test_
 """
 
 import os
-import shlex
 import signal
 import socket
 import subprocess
@@ -68,12 +67,6 @@ def open_in_place(path: Path) -> int:
     return os.open(path, os.O_RDWR | os.O_CREAT | _OPENING, 0o666)
 
 
-def write_at_begin(handle: int, content: bytes) -> None:
-    """Write over the beginning of a file, at once."""
-    os.lseek(handle, 0, os.SEEK_SET)
-    os.write(handle, content)
-
-
 if sys.platform == "win32":
     import ctypes
     import msvcrt
@@ -91,6 +84,10 @@ if sys.platform == "win32":
     # Why there is none.
     NO_LINUXCNC: Final[str | None] = "LinuxCNC runs on Linux alone; everything else of stepdiag works on Windows"
     _KERNEL: Final = ctypes.WinDLL("kernel32", use_last_error=True)
+    _KERNEL.LocalFree.argtypes = [ctypes.c_void_p]
+    _SPLIT: Final = ctypes.WinDLL("shell32").CommandLineToArgvW
+    _SPLIT.argtypes = [wintypes.LPCWSTR, ctypes.POINTER(ctypes.c_int)]
+    _SPLIT.restype = ctypes.POINTER(wintypes.LPWSTR)
 
     class _Memory(ctypes.Structure):
         """MEMORYSTATUSEX."""
@@ -153,7 +150,18 @@ if sys.platform == "win32":
 
     def words_of(line: str) -> list[str]:
         """Of a command as a person types it. Raises ValueError for a quotation without an end."""
-        return [word.strip('"') for word in shlex.split(line, posix=False)]
+        if line.replace('\\"', "").count('"') % 2:
+            raise ValueError("No closing quotation")
+        count = ctypes.c_int()
+        found = _SPLIT(f"program {line}", ctypes.byref(count))  # the first word has rules of its own
+        try:
+            return [str(found[place]) for place in range(1, count.value)]
+        finally:
+            _KERNEL.LocalFree(found)
+
+    def fingerprint_commands(names: Sequence[str]) -> list[str]:
+        """What a person types to see the SHA-256 of these files."""
+        return [command_line(["certutil", "-hashfile", name, "SHA256"]) for name in names]
 
     def lock(handle: int) -> None:
         """Lock an open file against other processes, until it is closed. Raises OSError if another one has it."""
@@ -181,6 +189,11 @@ if sys.platform == "win32":
 
     def sync_folder(folder: Path) -> None:
         """Windows keeps the name with the file."""
+
+    def write_at_begin(handle: int, content: bytes) -> None:
+        """Write over the beginning of a file, at once."""
+        os.lseek(handle, 0, os.SEEK_SET)
+        os.write(handle, content)
 
     def reserve(handle: int, size: int) -> None:
         """Make a file so large. Raises OSError if there is no room."""
@@ -222,6 +235,7 @@ else:
     import re
     import resource
     import select
+    import shlex
 
     SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
     KILL: Final = signal.SIGKILL
@@ -352,6 +366,10 @@ else:
         """Of a command as a person types it. Raises ValueError for a quotation without an end."""
         return shlex.split(line)
 
+    def fingerprint_commands(names: Sequence[str]) -> list[str]:
+        """What a person types to see the SHA-256 of these files."""
+        return [command_line(["sha256sum", *names])]
+
     def lock(handle: int) -> None:
         """Lock an open file against other processes, until it is closed. Raises OSError if another one has it."""
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -373,6 +391,10 @@ else:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+    def write_at_begin(handle: int, content: bytes) -> None:
+        """Write over the beginning of a file, at once."""
+        os.pwrite(handle, content, 0)
 
     def reserve(handle: int, size: int) -> None:
         """Make a file so large. Raises OSError if there is no room."""

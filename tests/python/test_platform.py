@@ -2,11 +2,13 @@
 
 import ast
 import re
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from places import ROOT
+from stepdiag.platform import command_line, fingerprint_commands, words_of
 
 PACKAGE = ROOT / "python" / "stepdiag"
 LINUX_ALONE = PACKAGE / "linuxcnc"  # LinuxCNC is one
@@ -83,3 +85,24 @@ def test_headers_of_one_system_stay_there() -> None:
         if re.match(r"#include <(unistd|fcntl|poll|windows|sched|sys/(?!types))", line)
     ]
     assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["program"], ["a b", "c"], ['say "this"', "x"], ["C:\\Users\\a b\\", "--name=c d"], ["", "it's", "µ"], ["a\\\\b"]],
+)
+def test_words_of_a_command_line_are_those_that_it_was_made_of(words: list[str]) -> None:
+    assert words_of(command_line(words)) == words
+
+
+def test_a_quotation_without_an_end_is_no_command() -> None:
+    with pytest.raises(ValueError, match="quotation"):
+        words_of('program "one two')
+
+
+def test_fingerprints_are_those_that_the_command_prints(tmp_path: Path) -> None:
+    (tmp_path / "a b.csv").write_bytes(b"abc")
+    (command,) = fingerprint_commands(["a b.csv"])
+    done = subprocess.run(words_of(command), cwd=tmp_path, capture_output=True, check=True, text=True)
+    # FIPS 180-2, appendix B.1
+    assert "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad" in done.stdout

@@ -10,7 +10,7 @@ from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.findings.meaning import PROVENANCE, UNVERIFIED, fit_words, headline, is_valid
 from stepdiag.findings.temperature import temperature_text
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units
-from stepdiag.platform import command_line
+from stepdiag.platform import command_line, fingerprint_commands
 from stepdiag.presentation.blocks import NoteBlock
 from stepdiag.presentation.comparison import comparison_blocks
 from stepdiag.presentation.fit import fit_blocks
@@ -317,15 +317,13 @@ def provenance_section(contents: Contents) -> Markup:
 def commands_section(contents: Contents, command: str) -> Markup:
     """The commands that repeat all of it."""
     request, method = contents.request, contents.calibration.method
-    scenario, run = (
-        command_line([path.name]) if path else name
-        for path, name in ((request.scenario, "SCENARIO"), (request.run, "RUN"))
-    )
+    names = [request.scenario.name if request.scenario else "SCENARIO", request.run.name if request.run else "RUN"]
+    scenario, run = (command_line([name]) for name in names)
     calibration = command_line([request.calibration.name])
     option = "" if method in ("adjustment", "") else f" -m {method}"
     covariance = " --covariance" if contents.calibration.covariance is not None else ""
     lines = [
-        f"sha256sum {scenario} {run}",
+        *fingerprint_commands(names),
         f"stepdiag check {scenario} {run}",
         f"stepdiag evaluate {scenario} {run}{option}{covariance} -o {calibration}",
         command,
