@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
+
 from stepdiag.platform import command_line, fingerprint_commands, words_of
 
 PACKAGE = ROOT / "python" / "stepdiag"
