@@ -123,7 +123,7 @@ def _formats() -> list[Markup]:
         element(
             "optgroup",
             *(
-                element("option", f"{one.what} – {key}", value=key)
+                element("option", f"{key} – {one.what}", value=key)
                 for key, one in FORMATS.items()
                 if one.controllers == group
             ),
