@@ -12,7 +12,7 @@ from small_scenario import SCENARIO
 from stepdiag.cli import main
 from stepdiag.interruption import uninterrupted
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to consoles, not to processes")
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to consoles: see test_interrupts_within")
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 LINE = {signal.SIGINT: "stepdiag: interrupted", signal.SIGTERM: "stepdiag: terminated"}
