@@ -120,18 +120,19 @@ def read_drawn_uncertainty(path: Path) -> DrawnUncertainty:
     Raises InvalidArgument naming the file, and the variable or line."""
     if not is_netcdf(path):
         return _of_csv(read_csv(path, ("output", "position_mm", "unit"), UNCERTAINTY_FORMAT))
-    from stepdiag.io.netcdf import open_dataset
+    from stepdiag.io.netcdf import read_netcdf
 
-    with open_dataset(path) as file:
-        file.check_format(UNCERTAINTY_FORMAT)
-        return _of_netcdf(file)
+    file = read_netcdf(path)
+    file.check_format(UNCERTAINTY_FORMAT)
+    return _of_netcdf(file)
 
 
 def _of_result(result: UncertaintyResult) -> DrawnUncertainty:
+    from stepdiag.io.labelled import LabelledTable
     from stepdiag.io.netcdf import NetcdfFile
     from stepdiag.uncertainty.table import uncertainty_table
 
-    return _of_netcdf(NetcdfFile(result.known.path, uncertainty_table(result)))
+    return _of_netcdf(NetcdfFile(result.known.path, LabelledTable.of(uncertainty_table(result))))
 
 
 def _of_netcdf(file: "NetcdfFile") -> DrawnUncertainty:

@@ -12,7 +12,7 @@ from stepdiag._core import Adjustment, Measurement
 from stepdiag.io.adjustment_table import adjustment_table
 from stepdiag.io.data_files import is_netcdf
 from stepdiag.io.labelled_tables import channel_units
-from stepdiag.io.netcdf import NetcdfFile, open_dataset
+from stepdiag.io.netcdf import NetcdfFile, read_netcdf
 from stepdiag.io.netcdf_read import CALIBRATION_FORMAT
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 
@@ -77,9 +77,9 @@ def read_fit_details(path: Path) -> FitDetails | None:
     Raises InvalidArgument naming file and variable."""
     if not is_netcdf(path):
         return None
-    with open_dataset(path) as file:
-        file.check_format(CALIBRATION_FORMAT)
-        return _details(file) if "degrees_of_freedom" in file and "reading_line" in file else None
+    file = read_netcdf(path)
+    file.check_format(CALIBRATION_FORMAT)
+    return _details(file) if "degrees_of_freedom" in file and "reading_line" in file else None
 
 
 def details_of(adjustment: Adjustment, measurement: Measurement) -> FitDetails:

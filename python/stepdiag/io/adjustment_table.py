@@ -4,15 +4,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from stepdiag._core import Adjustment, FaultClass, Measurement, Outlier, SetupEstimate
 from stepdiag.findings.undetermined import combination_text
+from stepdiag.io.labelled import LabelledTable
 from stepdiag.io.labelled_tables import calibration_table, channel_units
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 
 
-def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = None) -> xr.Dataset:
+def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = None) -> LabelledTable:
     """The table of the calibration, with unknowns of the set-up along `setup`, readings left out along
     `outlier` and all that may be a fault along `fault`.
 
@@ -21,8 +21,8 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
     Test values are scalars; combinations and the smoothness in force are attributes."""
     table = calibration_table(adjustment.calibration)
     for name, deviation in adjustment.smoothness.items():
-        if name in table:
-            table[name].attrs["second_difference_deviation"] = deviation
+        if name in table.variables:
+            table.variables[name].attrs["second_difference_deviation"] = deviation
     variables = _test_values(adjustment) | _readings(adjustment)
     if measurement is not None and adjustment.residuals:
         variables |= _labels(measurement)
@@ -32,7 +32,9 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
         variables |= _outliers(adjustment.outliers)
     if adjustment.faults:
         variables |= _faults(adjustment.faults)
-    return table.assign(variables).assign_attrs(combinations="\n".join(map(combination_text, adjustment.combinations)))
+    table.add(variables)
+    table.attrs["combinations"] = "\n".join(map(combination_text, adjustment.combinations))
+    return table
 
 
 def _test_values(adjustment: Adjustment) -> dict[str, Any]:

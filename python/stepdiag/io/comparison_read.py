@@ -46,16 +46,16 @@ def read_comparison(path: Path) -> StoredComparison:
 
 
 def _read_netcdf(path: Path) -> StoredComparison:
-    from stepdiag.io.netcdf import open_dataset  # imports xarray, which takes half a second
+    from stepdiag.io.netcdf import read_netcdf
 
-    with open_dataset(path) as file:
-        file.check_format(COMPARISON_FORMAT)
-        names = [name.removesuffix("_difference") for name in file.names if name.endswith("_difference")]
-        differences = tuple(_difference(file, name) for name in names if _PARAMETER.fullmatch(name))
-        numbers = {key: file.number(key) for key in ("limit", "values")}
-        made = {key: file.text(key, "") for key in _MADE}
-        leading = {key: f"{number!r}" for key, number in numbers.items() if number is not None}
-        return _checked(path, differences, file.lengths("volume_mm"), leading, made)
+    file = read_netcdf(path)
+    file.check_format(COMPARISON_FORMAT)
+    names = [name.removesuffix("_difference") for name in file.names if name.endswith("_difference")]
+    differences = tuple(_difference(file, name) for name in names if _PARAMETER.fullmatch(name))
+    numbers = {key: file.number(key) for key in ("limit", "values")}
+    made = {key: file.text(key, "") for key in _MADE}
+    leading = {key: f"{number!r}" for key, number in numbers.items() if number is not None}
+    return _checked(path, differences, file.lengths("volume_mm"), leading, made)
 
 
 def _difference(file: "NetcdfFile", name: str) -> Difference:

@@ -1,16 +1,18 @@
-"""Measurements and calibrations as labelled tables (xarray), in native units: mm, rad."""
+"""Measurements and calibrations as labelled tables, in native units: mm, rad."""
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.findings.meaning import unverified_key
+from stepdiag.io.labelled import LabelledTable
 from stepdiag.parameters import COMPONENT_MEANING, units_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _SQUARENESS = {"C0Y": "squareness of Y to X", "B0Z": "squareness of Z to X", "A0Z": "squareness of Z to Y"}
 _CHANNEL = {
@@ -30,7 +32,7 @@ _CHANNEL = {
 }
 
 
-def measurement_table(measurement: Measurement) -> xr.Dataset:
+def measurement_table(measurement: Measurement) -> LabelledTable:
     """A measurement along the dimension `reading`; lost readings are NaN.
 
     Coordinates are line, point, run, direction, and the commanded position x, y, z (mm). Variables
@@ -55,11 +57,13 @@ def measurement_table(measurement: Measurement) -> xr.Dataset:
         variables[name] = ("reading", value, {"units": units, "long_name": meaning})
     for name, value in measurement.standard_uncertainty.items():
         variables[f"{name}_u"] = ("reading", value, _uncertainty_of(variables[name][2]))
-    return xr.Dataset(variables, coordinates, {"title": "step-diagonal measurement"})
+    return LabelledTable(variables, coordinates, {"title": "step-diagonal measurement"})
 
 
-def calibration_frame(calibration: Calibration) -> pd.DataFrame:
+def calibration_frame(calibration: Calibration) -> "pd.DataFrame":
     """A row for each value of a calibration: parameter, position, value, standard_uncertainty, unit."""
+    import pandas as pd
+
     parts = []
     for name in calibration:
         position, value, uncertainty = calibration[name]
@@ -86,7 +90,7 @@ def position_axis(coordinates: dict[str, Any], name: str, position: Any) -> str:
     return axis
 
 
-def calibration_table(calibration: Calibration) -> xr.Dataset:
+def calibration_table(calibration: Calibration) -> LabelledTable:
     """The determined parameters by name, each with its standard uncertainty as NAME_u.
 
     Functions have the dimension x, y or z, the position of their axis (mm). A function with other
@@ -135,7 +139,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         variables[name] = ((), angle, attributes)
         variables[f"{name}_u"] = ((), angle_uncertainty, _uncertainty_of(attributes))
     variables |= _covariance(calibration)
-    return xr.Dataset(variables, coordinates, _attributes(calibration))
+    return LabelledTable(variables, coordinates, _attributes(calibration))
 
 
 def _attributes(calibration: Calibration) -> dict[str, Any]:

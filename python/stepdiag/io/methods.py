@@ -21,14 +21,14 @@ def calibration_to_xarray(self: Calibration) -> "xarray.Dataset":
     """The calibration as a labelled table (xarray.Dataset)."""
     from stepdiag.io.labelled_tables import calibration_table
 
-    return calibration_table(self)
+    return calibration_table(self).to_xarray()
 
 
 def measurement_to_xarray(self: Measurement) -> "xarray.Dataset":
     """The measurement as a labelled table (xarray.Dataset)."""
     from stepdiag.io.labelled_tables import measurement_table
 
-    return measurement_table(self)
+    return measurement_table(self).to_xarray()
 
 
 def calibration_to_dataframe(self: Calibration) -> "pandas.DataFrame":

@@ -9,21 +9,21 @@ import os
 import secrets
 import struct
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import netCDF4
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
-from xarray.backends import NetCDF4DataStore
 
 from stepdiag import platform
 from stepdiag._core import InvalidArgument, __version__, newer_format
 from stepdiag.interruption import at_end, uninterrupted
+from stepdiag.io.labelled import LabelledArray, LabelledTable
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
 
 # A file may declare this much, plus a hundred times its size: compression is limited.
@@ -33,42 +33,35 @@ _LARGEST_COMPRESSION = 100
 _ROOM = 2**19  # bytes of a file beside its values, at most
 _CHECKSUM = "sha256"
 _OF_OTHERS = ("history",)  # attributes that other programs add to, as their conventions want
+# Attributes that say how values are stored; they are no part of what a file says.
+_OF_STORAGE = ("_Encoding", "_FillValue", "_Unsigned", "add_offset", "coordinates", "missing_value", "scale_factor")
 _LIBRARIES = threading.RLock()  # HDF5 crashes where two threads use it at once
 _FILL = netCDF4.default_fillvals["f8"]  # netCDF's mark of values never written
 
 
-def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -> None:
+def write_netcdf(table: LabelledTable, path: Path, attributes: dict[str, Any]) -> None:
     """Write a table, with these global attributes before its own.
 
     Texts are stored as characters. The attribute `sha256` is the checksum of all values and
     attributes; arrays get Fletcher-32 too, which every netCDF library checks. Raises
     InvalidArgument if the file cannot be written."""
     first = {"Conventions": "CF-1.11", "source": f"stepdiag {__version__}"} | attributes
-    dataset = dataset.assign_attrs(first)
-    dataset.attrs = first | dataset.attrs
-    dataset.encoding["unlimited_dims"] = set()
-    for name, variable in dataset.variables.items():
-        if variable.dtype.kind in "US":
-            variable.encoding = {"dtype": "S1", "char_dim_name": f"{name}_length", "fletcher32": True}
-            continue
-        variable.encoding = {"fletcher32": variable.ndim > 0}
-        if variable.dtype.kind == "f" and not np.isnan(variable.values).any():
-            variable.encoding["_FillValue"] = None
-    dataset.attrs[_CHECKSUM] = _checksum(dataset)
+    table.attrs = first | table.attrs | first
+    table.attrs[_CHECKSUM] = _checksum(table.attrs, table.variables)
     check_output(path)
     try:
-        content = _packed(dataset, path)
+        content = _packed(table, path)
     except (OSError, RuntimeError) as error:  # RuntimeError: of the C libraries
         raise InvalidArgument(f"{path}: cannot be written: {_one_line(error)}") from None
     write_whole(path, content)
 
 
-def _packed(dataset: xr.Dataset, path: Path) -> memoryview:
+def _packed(table: LabelledTable, path: Path) -> memoryview:
     """The content of a file, made in memory if there is room, else beside `path`: where a disk fails, the C libraries
     crash."""
     # An exception inside of the libraries leaves their locks taken.
     with _LIBRARIES, uninterrupted(), ExitStack() as stack:
-        size = dataset.nbytes + _ROOM
+        size = sum(variable.values.nbytes for variable in table.variables.values()) + _ROOM
         try:
             scratch, handle = stack.enter_context(_scratch(platform.memory_folder() or path.parent, size))
         except OSError:
@@ -76,11 +69,42 @@ def _packed(dataset: xr.Dataset, path: Path) -> memoryview:
         file = netCDF4.Dataset(scratch, "w", format="NETCDF4")  # not with memory=, which forgets the variables' order
         if platform.OPEN_FILES_CAN_GO:
             scratch.unlink()
-        dataset.dump_to_store(NetCDF4DataStore(file))  # type: ignore[no-untyped-call]
+        _dump(table, file)
         file.close()
         if not platform.OPEN_FILES_CAN_GO:
             return memoryview(scratch.read_bytes())
         return memoryview(mmap.mmap(handle, 0, access=mmap.ACCESS_READ))
+
+
+def _dump(table: LabelledTable, file: netCDF4.Dataset) -> None:
+    """By the CF conventions: a variable names its coordinates, the table those of no variable."""
+    along = {name for name in table.coordinates if table.variables[name].dims == (name,)}
+    others = {name: set(table.variables[name].dims) for name in sorted(table.coordinates - along)}
+    unnamed = set(others)
+    for name, (dims, values, attrs) in table.variables.items():
+        own = {}
+        if name not in table.coordinates:
+            named = [other for other, needed in others.items() if needed <= {*dims}]
+            unnamed -= {*named}
+            own = {"coordinates": " ".join(named)} if named else {}
+        fill = np.nan if values.dtype.kind == "f" and np.isnan(values).any() else None
+        if values.dtype.kind in "US":
+            dims, values = (*dims, f"{name}_length"), _characters(values)
+            own["_Encoding"] = "utf-8"
+        for dimension, length in zip(dims, values.shape, strict=True):
+            if dimension not in file.dimensions:
+                file.createDimension(dimension, length)
+        variable = file.createVariable(name, values.dtype, dims, fletcher32=bool(dims), fill_value=fill)
+        variable.set_auto_maskandscale(False)
+        variable.setncatts({**attrs, **own})
+        variable[...] = values
+    file.setncatts(table.attrs | ({"coordinates": " ".join(sorted(unnamed))} if unnamed else {}))
+
+
+def _characters(texts: npt.NDArray[Any]) -> npt.NDArray[np.bytes_]:
+    """Texts in UTF-8, their characters along one more dimension."""
+    encoded = np.ascontiguousarray(np.char.encode(texts, "utf-8") if texts.dtype.kind == "U" else texts)
+    return encoded.view("S1").reshape(*texts.shape, encoded.dtype.itemsize)
 
 
 @contextmanager
@@ -97,35 +121,77 @@ def _scratch(folder: Path, size: int) -> Iterator[tuple[Path, int]]:
             path.unlink(missing_ok=True)
 
 
-@contextmanager
-def open_dataset(path: Path) -> Iterator["NetcdfFile"]:
-    """Open a netCDF file for reading.
-
-    Raises InvalidArgument naming the file for any fault in it."""
+def read_netcdf(path: Path) -> "NetcdfFile":
+    """A netCDF file. Raises InvalidArgument naming the file for any fault in it."""
     content = read_bytes(path)
     _check_heaps(content, path)
     with _LIBRARIES:
         try:
-            file = netCDF4.Dataset("memory.nc", memory=content)
-            _check_size(file, len(content), path)
-            store = NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
-            dataset = xr.open_dataset(store, decode_times=False, decode_timedelta=False)
+            with netCDF4.Dataset("memory.nc", memory=content) as file:
+                _check_size(file, len(content), path)
+                found = NetcdfFile(path, *_loaded(file))
         except InvalidArgument:
             raise
         except Exception as error:  # the libraries raise anything for a damaged file
             raise InvalidArgument(f"{path}: expected a netCDF file: {_one_line(error)}") from None
-        with dataset:
-            file_of = NetcdfFile(path, dataset)
-            file_of.check()
-            yield file_of
+    found.check()
+    return found
+
+
+def _loaded(file: netCDF4.Dataset) -> tuple[LabelledTable, dict[str, str]]:
+    """What is in a file, and why variables cannot be read."""
+    file.set_auto_maskandscale(False)
+    file.set_auto_chartostring(False)
+    table = LabelledTable({}, {}, _attributes(file))
+    damaged = {}
+    for name, variable in file.variables.items():
+        dims, values = variable.dimensions, np.empty(0)
+        attrs = _attributes(variable)
+        try:
+            values = _decoded(np.asarray(variable[...]), variable)
+            dims = dims[: values.ndim]
+        except Exception as error:  # such as a wrong checksum
+            damaged[name] = _one_line(error)
+        table.variables[name] = LabelledArray(dims, values, attrs)
+    return table, damaged
+
+
+def _attributes(of: Any) -> dict[str, Any]:
+    return {name: of.getncattr(name) for name in of.ncattrs() if name not in _OF_STORAGE}
+
+
+def _decoded(values: npt.NDArray[Any], variable: Any) -> npt.NDArray[Any]:
+    """Values as they are meant: characters are texts, a mark of missing ones is NaN, packed numbers are unpacked."""
+    stored = {name: variable.getncattr(name) for name in variable.ncattrs() if name in _OF_STORAGE}
+    if values.dtype == "S1":
+        if values.ndim:
+            width = values.shape[-1]
+            values = (
+                np.ascontiguousarray(values).view(f"S{max(width, 1)}").reshape(values.shape[:-1])
+                if width
+                else (np.zeros(values.shape[:-1], "S1"))
+            )
+        return np.char.decode(values, str(stored["_Encoding"])) if "_Encoding" in stored else values
+    if values.dtype.kind not in "fiu":
+        return values
+    marks = [mark for name in ("_FillValue", "missing_value") for mark in np.atleast_1d(stored.get(name, []))]
+    missing = np.isin(values, marks)
+    if marks and (values.dtype.kind != "f" or missing.any()):
+        values = values.astype(np.float64)
+        values[missing] = np.nan
+    if "scale_factor" in stored or "add_offset" in stored:
+        values = values * np.float64(stored.get("scale_factor", 1.0)) + np.float64(stored.get("add_offset", 0.0))
+    return values
 
 
 class NetcdfFile:
-    """Checked access to the variables and attributes of an open file."""
+    """Checked access to the variables and attributes of a file."""
 
-    def __init__(self, path: Path, dataset: xr.Dataset) -> None:
+    def __init__(self, path: Path, table: LabelledTable, damaged: Mapping[str, str] = MappingProxyType({})) -> None:
+        """`damaged`: why variables cannot be read."""
         self.path = path
-        self._dataset = dataset
+        self._table = table
+        self._damaged = damaged
 
     def check_format(self, expected: str) -> None:
         """Check the attribute `format`, which files of other programs may lack. Raises InvalidArgument."""
@@ -135,34 +201,35 @@ class NetcdfFile:
 
     @property
     def has_checksum(self) -> bool:
-        return _CHECKSUM in self._dataset.attrs
+        return _CHECKSUM in self._table.attrs
 
     def check(self) -> None:
         """Compare the content with the checksum of the file, if it has one. Raises InvalidArgument."""
-        expected = self._dataset.attrs.get(_CHECKSUM)
+        expected = self._table.attrs.get(_CHECKSUM)
         if expected is None:
             return
         for name in self.names:
-            self._load(name, self._variable(name))
-        if expected != _checksum(self._dataset):
+            self._load(name)
+        found = _checksum(self._table.attrs, self._table.variables)
+        if expected != found:
             raise self.fail(
                 f"attribute {_CHECKSUM}",
-                f"expected {_show(expected)}, got {_checksum(self._dataset)}; the file was damaged or changed: "
+                f"expected {_show(expected)}, got {found}; the file was damaged or changed: "
                 "without this attribute it is read as it is, a calibration as unverified",
             )
 
     def __contains__(self, name: str) -> bool:
-        return name in self._dataset.variables
+        return name in self._table.variables
 
     @property
     def names(self) -> list[str]:
-        return [str(name) for name in self._dataset.variables]
+        return list(self._table.variables)
 
     def fail(self, name: str, message: str) -> InvalidArgument:
         return InvalidArgument(f"{self.path}: {name}: {message}")
 
     def dimensions(self, name: str) -> tuple[str, ...]:
-        return tuple(str(dimension) for dimension in self._variable(name).dims)
+        return self._variable(name).dims
 
     def numbers(
         self,
@@ -175,12 +242,13 @@ class NetcdfFile:
     ) -> npt.NDArray[np.float64]:
         """A variable with these dimensions and units, as doubles; NaN only if `missing`, infinite ones likewise."""
         variable = self._variable(name, dimensions)
-        if variable.dtype.kind not in "fiu":
-            raise self.fail(name, f"expected numbers, got values of type {variable.dtype}")
+        stored = self._load(name)
+        if stored.dtype.kind not in "fiu":
+            raise self.fail(name, f"expected numbers, got values of type {stored.dtype}")
         given = variable.attrs.get("units")
         if units is not None and not (isinstance(given, str) and given == units):
             raise self.fail(name, f'units: expected "{units}", got {_show(given)}')
-        values = np.array(self._load(name, variable), dtype=np.float64)
+        values = np.array(stored, dtype=np.float64)
         values[values == _FILL] = np.nan
         if not infinite and np.isinf(values).any():
             raise self.fail(name, "expected finite numbers, got an infinite one")
@@ -189,13 +257,15 @@ class NetcdfFile:
         return values
 
     def integers(self, name: str, dimensions: Sequence[str]) -> list[int]:
-        variable = self._variable(name, dimensions)
-        if variable.dtype.kind not in "iu":
-            raise self.fail(name, f"expected whole numbers, none missing, got values of type {variable.dtype}")
-        return [int(value) for value in self._load(name, variable)]
+        self._variable(name, dimensions)
+        values = self._load(name)
+        if values.dtype.kind not in "iu":
+            raise self.fail(name, f"expected whole numbers, none missing, got values of type {values.dtype}")
+        return [int(value) for value in values]
 
     def texts(self, name: str, dimensions: Sequence[str]) -> list[str]:
-        values = self._load(name, self._variable(name, dimensions)).tolist()
+        self._variable(name, dimensions)
+        values = self._load(name).tolist()
         if not all(isinstance(value, str | bytes) for value in values):
             raise self.fail(name, "expected texts")
         try:
@@ -205,7 +275,7 @@ class NetcdfFile:
 
     def text(self, attribute: str, default: str | None = None, *, of: str | None = None) -> str:
         """A text: a global attribute, or an attribute of the variable `of`."""
-        where = self._dataset.attrs if of is None else self._variable(of).attrs
+        where = self._table.attrs if of is None else self._variable(of).attrs
         name = f"attribute {attribute}" if of is None else f"{of}: attribute {attribute}"
         value = where.get(attribute, default)
         if value is None:
@@ -216,7 +286,7 @@ class NetcdfFile:
 
     def lengths(self, attribute: str) -> npt.NDArray[np.float64]:
         """A global attribute with three numbers, as a rule lengths."""
-        value = self._dataset.attrs.get(attribute)
+        value = self._table.attrs.get(attribute)
         if value is None:
             raise self.fail(f"attribute {attribute}", "missing")
         lengths = np.asarray(value)
@@ -225,11 +295,11 @@ class NetcdfFile:
         return lengths.astype(np.float64)
 
     def lengths_if_there(self, attribute: str) -> npt.NDArray[np.float64] | None:
-        return self.lengths(attribute) if attribute in self._dataset.attrs else None
+        return self.lengths(attribute) if attribute in self._table.attrs else None
 
     def number(self, attribute: str) -> float | None:
         """A global attribute with a number; None if it is missing."""
-        value = self._dataset.attrs.get(attribute)
+        value = self._table.attrs.get(attribute)
         if value is None:
             return None
         number = np.asarray(value)
@@ -237,23 +307,22 @@ class NetcdfFile:
             raise self.fail(f"attribute {attribute}", f"expected a number, got {_show(value)}")
         return float(number.reshape(()))
 
-    def _variable(self, name: str, dimensions: Sequence[str] | None = None) -> xr.Variable:
-        if name not in self._dataset.variables:
+    def _variable(self, name: str, dimensions: Sequence[str] | None = None) -> LabelledArray:
+        if name not in self._table.variables:
             raise self.fail(name, "the variable is missing")
-        variable = self._dataset.variables[name]
+        variable = self._table.variables[name]
         if dimensions is not None and variable.dims != tuple(dimensions):
-            wanted, given = (f"({', '.join(map(str, dims))})" for dims in (dimensions, variable.dims))
+            wanted, given = (f"({', '.join(dims)})" for dims in (dimensions, variable.dims))
             raise self.fail(name, f"expected the dimensions {wanted}, got {given}")
         return variable
 
-    def _load(self, name: str, variable: xr.Variable) -> npt.NDArray[Any]:
-        try:
-            return np.asarray(variable.values)
-        except Exception as error:  # such as a wrong checksum
-            raise self.fail(name, f"cannot be read: {_one_line(error)}") from None
+    def _load(self, name: str) -> npt.NDArray[Any]:
+        if name in self._damaged:
+            raise self.fail(name, f"cannot be read: {self._damaged[name]}")
+        return self._variable(name).values
 
 
-def _checksum(dataset: xr.Dataset) -> str:
+def _checksum(attributes: Mapping[str, Any], variables: Mapping[str, LabelledArray]) -> str:
     """SHA-256 of all attributes and of the variables with their dimensions, in the order of their names.
 
     A name is followed by its values: numbers as little-endian doubles, NaN as NumPy's, texts in
@@ -271,15 +340,15 @@ def _checksum(dataset: xr.Dataset) -> str:
         for text in values.ravel().tolist():
             digest.update((text if isinstance(text, bytes) else str(text).encode()) + b"\0")
 
-    def add_attributes(owner: str, attributes: dict[str, Any]) -> None:
-        for key in sorted(attributes):
+    def add_attributes(owner: str, own: Mapping[str, Any]) -> None:
+        for key in sorted(own):
             if key not in (_CHECKSUM, *_OF_OTHERS):
-                add(f"{owner}:{key}", attributes[key])
+                add(f"{owner}:{key}", own[key])
 
-    add_attributes("", dataset.attrs)
-    for name in sorted(map(str, dataset.variables)):
-        variable = dataset.variables[name]
-        add(f"{name}({','.join(map(str, variable.dims))})", variable.values)
+    add_attributes("", attributes)
+    for name in sorted(variables):
+        variable = variables[name]
+        add(f"{name}({','.join(variable.dims)})", variable.values)
         add_attributes(name, variable.attrs)
     return digest.hexdigest()
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 from stepdiag._core import Adjustment, Calibration, Measurement
 from stepdiag.io.adjustment_table import adjustment_table
 from stepdiag.io.labelled_tables import calibration_table, measurement_table
-from stepdiag.io.netcdf import write_dataset
+from stepdiag.io.netcdf import write_netcdf
 from stepdiag.io.netcdf_read import CALIBRATION_FORMAT, MEASUREMENT_FORMAT
 
 _OF_MEASUREMENT: Final = {
@@ -52,7 +52,7 @@ _OF_ADJUSTMENT: Final = {
 
 def write_measurement_netcdf(measurement: Measurement, path: Path, date: str) -> None:
     """Write a measurement. Raises InvalidArgument if the file cannot be written."""
-    write_dataset(measurement_table(measurement), path, _OF_MEASUREMENT | {"date": date})
+    write_netcdf(measurement_table(measurement), path, _OF_MEASUREMENT | {"date": date})
 
 
 def write_calibration_netcdf(
@@ -70,6 +70,6 @@ def write_calibration_netcdf(
         table = calibration_table(result)
     else:
         table, attributes = adjustment_table(result, measurement), attributes | _OF_ADJUSTMENT
-    if any(str(name).endswith("_reversal") for name in table):
+    if any(name.endswith("_reversal") for name in table.variables):
         attributes |= _OF_REVERSAL
-    write_dataset(table, path, attributes)
+    write_netcdf(table, path, attributes)

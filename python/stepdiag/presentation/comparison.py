@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,13 +15,11 @@ from stepdiag.findings.meaning import unverified_key
 from stepdiag.io.comparison_read import COMPARISON_FORMAT
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf
+from stepdiag.io.labelled import LabelledTable
 from stepdiag.io.whole_files import write_whole
 from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
 from stepdiag.presentation.blocks import Block, HeadingBlock, RowBlock, TableBlock, VerdictBlock
 from stepdiag.units import report_value
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 EFFECTS_SHOWN: Final = 5
 LEAST_PROBABILITY: Final = 1e-12  # that is shown
@@ -222,10 +220,8 @@ def decimal(value: float, shift: int = 0) -> str:
     return repr(value) if shift == 0 or value == 0.0 else str(Decimal(repr(value)).scaleb(shift))
 
 
-def comparison_table(comparison: Comparison) -> "xr.Dataset":
+def comparison_table(comparison: Comparison) -> LabelledTable:
     """The differences as NAME_difference, with NAME_difference_u and NAME_normalised, over positions x, y, z (mm)."""
-    import xarray as xr  # takes half a second, which the other reports need not wait for
-
     from stepdiag.io.labelled_tables import position_axis
 
     coordinates: dict[str, Any] = {}
@@ -252,7 +248,7 @@ def comparison_table(comparison: Comparison) -> "xr.Dataset":
         ):
             variables[f"{name}_{suffix}"] = (dimensions, values if dimensions else float(values[0]), own)
     a, b = comparison.a, comparison.b
-    return xr.Dataset(
+    return LabelledTable(
         variables,
         coordinates,
         {
@@ -274,9 +270,9 @@ def write_comparison(comparison: Comparison, path: Path) -> None:
     if not is_netcdf(path):
         write_whole(path, comparison_csv(comparison))
         return
-    from stepdiag.io.netcdf import write_dataset
+    from stepdiag.io.netcdf import write_netcdf
 
-    write_dataset(comparison_table(comparison), path, {"format": COMPARISON_FORMAT, "date": date_of_today()})
+    write_netcdf(comparison_table(comparison), path, {"format": COMPARISON_FORMAT, "date": date_of_today()})
 
 
 def _flag(value: bool) -> str:

@@ -15,7 +15,8 @@ import xarray as xr
 
 from stepdiag.config.key_errors import show
 from stepdiag.io.data_files import date_of_today
-from stepdiag.io.netcdf import write_dataset
+from stepdiag.io.labelled import LabelledTable
+from stepdiag.io.netcdf import write_netcdf
 from stepdiag.parameters import KINDS
 from stepdiag.uncertainty.study_cell import FIGURES, SUMMARIES, CellResult
 from stepdiag.uncertainty.study_keys import Study
@@ -54,7 +55,7 @@ _UNITS: Final = {
 def write_study(study: Study, results: Mapping[tuple[int, ...], CellResult], path: Path) -> None:
     """Write a result as netCDF. Cells without a result are missing values."""
     date = {"date": date_of_today()}
-    write_dataset(study_table(study, results), path, _ABOUT | date)
+    write_netcdf(LabelledTable.of(study_table(study, results)), path, _ABOUT | date)
 
 
 @checked

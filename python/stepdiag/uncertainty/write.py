@@ -8,7 +8,8 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.io.csv_text import csv_text
 from stepdiag.io.data_files import date_of_today, is_netcdf
-from stepdiag.io.netcdf import write_dataset
+from stepdiag.io.labelled import LabelledTable
+from stepdiag.io.netcdf import write_netcdf
 from stepdiag.io.whole_files import write_whole
 from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT, UncertaintyResult
 from stepdiag.uncertainty.table import ABOUT, attributes_of, columns_of, uncertainty_table
@@ -20,7 +21,7 @@ def write_uncertainty(result: UncertaintyResult, path: Path) -> None:
 
     Raises InvalidArgument if it cannot be written."""
     if is_netcdf(path):
-        write_dataset(uncertainty_table(result), path, ABOUT | {"date": date_of_today()})
+        write_netcdf(LabelledTable.of(uncertainty_table(result)), path, ABOUT | {"date": date_of_today()})
     elif path.suffix.lower() == ".csv":
         write_whole(path, uncertainty_csv(result))
     else:

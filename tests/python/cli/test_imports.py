@@ -36,3 +36,13 @@ def test_evaluating_to_csv_imports_no_netcdf_and_no_search_that_is_not_made(tmp_
         "stepdiag.head.description stepdiag.presentation.objects.evaluation stepdiag.cli.at_machine.acquire"
     )
     assert imported_of(modules, "evaluate", scenario, run, "-o", tmp_path / "calibration.csv") == ""
+
+
+def test_netcdf_files_need_neither_xarray_nor_pandas(tmp_path: Path) -> None:
+    scenario, run, calibration = EXAMPLES / "scenario.toml", tmp_path / "run.nc", tmp_path / "calibration.nc"
+    modules = "xarray pandas matplotlib dask scipy"
+    assert imported_of(modules, "simulate", scenario, "-o", run) == ""
+    assert imported_of(modules, "evaluate", scenario, run, "-o", calibration) == ""
+    for command in ("volume", "report", "check"):
+        assert imported_of(modules, command, calibration) == ""
+    assert imported_of(modules, "compare", calibration, calibration, "-o", tmp_path / "changes.nc") == ""

@@ -41,7 +41,7 @@ CHILD = "child = subprocess.Popen(['sleep', '600']); said(child.pid); child.wait
 READING = "import stepdiag.scenario.description as d; d.read_scenario = stop"
 EVALUATING = "import stepdiag.uncertainty.run as r; r.evaluate_uncertainty = stop"
 WRITING = "import os; os.fsync = stop"
-NETCDF = "import xarray; xarray.Dataset.dump_to_store = stop"
+NETCDF = "import stepdiag.io.netcdf as n; n._dump = stop"
 SIMULATE = ["simulate", "scenario.toml", "--overwrite", "-o"]
 
 

@@ -15,7 +15,7 @@ import xarray as xr
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag.io.netcdf import open_dataset
+from stepdiag.io.netcdf import read_netcdf
 from stepdiag.presentation.blocks import text_of
 from stepdiag.presentation.uncertainty import uncertainty_blocks
 from stepdiag.scenario.description import parse_scenario
@@ -119,8 +119,7 @@ def test_netcdf_file_has_it_all_for_who_never_heard_of_us(tmp_path: Path) -> Non
         assert table["joint_a_smallest"].values.tolist() == [[1, 0, 1], [1, 0, 0]]
         assert table["joint_a_name"].values.tolist() == ["C0Y", "X at (1, 2, 3)"]
         assert table["output_name"].values.tolist()[-2:] == ["C0Y", "X at (1, 2, 3)"]
-    with open_dataset(path) as file:
-        assert file.numbers("EXX_u", ["x"], "mm").tolist() == [0.0, 1e-6, 2e-6]
+    assert read_netcdf(path).numbers("EXX_u", ["x"], "mm").tolist() == [0.0, 1e-6, 2e-6]
 
 
 def test_csv_file_has_a_row_an_output_in_micrometres(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument
-from stepdiag.io.netcdf import NetcdfFile, open_dataset
+from stepdiag.io.netcdf import NetcdfFile, read_netcdf
 from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.presentation.page.figure import Figures, values
 from stepdiag.presentation.page.html import Markup, element, markup, section, table
@@ -44,24 +44,24 @@ class Budget(NamedTuple):
 def read_budget(path: Path, calibration: Calibration) -> Budget:
     """Read the budget of an uncertainty result (netCDF). Raises InvalidArgument where it is none, or of a machine or a
     method other than the calibration's."""
-    with open_dataset(path) as file:
-        is_uncertainty = file.text("format", "").startswith("stepdiag uncertainty")
-        if is_uncertainty:
-            file.check_format(UNCERTAINTY_FORMAT)
-        if not is_uncertainty or "budget" not in file:
-            raise InvalidArgument(f"{path}: expected a result of `stepdiag uncertainty` (.nc) with its budget")
-        _check_belongs(file, path, calibration)
-        outputs = ("output",)
-        names, units = file.texts("output_name", outputs), file.texts("output_units", outputs)
-        where = file.numbers("output_position", outputs, "mm", missing=True)
-        groups = file.texts("group", ("group",))
-        parts = file.numbers("budget", ("group", "output"), None)
-        total = np.array([_uncertainty(file, name, at) for name, at in zip(names, where, strict=True)])
-        for name, (nodes, _, _) in calibration.functions.items():
-            own = where[[one == name for one in names]]
-            if len(own) != len(nodes) or not np.allclose(own, nodes, rtol=0.0, atol=1e-6):
-                raise InvalidArgument(f"{path}: {name} has other positions than the calibration: it is of another plan")
-        method, coverage = file.text("method", ""), file.number("coverage") or 0.95
+    file = read_netcdf(path)
+    is_uncertainty = file.text("format", "").startswith("stepdiag uncertainty")
+    if is_uncertainty:
+        file.check_format(UNCERTAINTY_FORMAT)
+    if not is_uncertainty or "budget" not in file:
+        raise InvalidArgument(f"{path}: expected a result of `stepdiag uncertainty` (.nc) with its budget")
+    _check_belongs(file, path, calibration)
+    outputs = ("output",)
+    names, units = file.texts("output_name", outputs), file.texts("output_units", outputs)
+    where = file.numbers("output_position", outputs, "mm", missing=True)
+    groups = file.texts("group", ("group",))
+    parts = file.numbers("budget", ("group", "output"), None)
+    total = np.array([_uncertainty(file, name, at) for name, at in zip(names, where, strict=True)])
+    for name, (nodes, _, _) in calibration.functions.items():
+        own = where[[one == name for one in names]]
+        if len(own) != len(nodes) or not np.allclose(own, nodes, rtol=0.0, atol=1e-6):
+            raise InvalidArgument(f"{path}: {name} has other positions than the calibration: it is of another plan")
+    method, coverage = file.text("method", ""), file.number("coverage") or 0.95
     shares = []
     kinds = [kind_of(name) if np.isfinite(u) else None for name, u in zip(names, total, strict=True)]
     for kind in KINDS:
