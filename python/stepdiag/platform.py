@@ -10,7 +10,6 @@ import subprocess
 import sys
 import threading
 import time
-import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
@@ -28,6 +27,8 @@ def exit_code(status: int) -> int:
 
 def open_browser(address: str) -> bool:
     """In the person's own browser. False: there is none."""
+    import webbrowser  # and half of the standard library
+
     return webbrowser.open(address)
 
 
