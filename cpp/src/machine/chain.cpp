@@ -1,7 +1,8 @@
 #include "stepdiag/machine/chain.hpp"
 
 #include <algorithm>
-#include <sstream>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "stepdiag/core/error.hpp"
@@ -28,8 +29,14 @@ std::vector<std::string> links(std::string_view text) {
     const auto last = text.find_last_not_of(" \t");
     if (first == std::string_view::npos || text[first] != '[' || text[last] != ']' || first == last)
         refuse(text, "brackets [ ] are missing");
-    std::istringstream stream(std::string(text.substr(first + 1, last - first - 1)));
-    for (std::string name; stream >> name;) names.push_back(name);
+    // Not by a stream, which asks the locale what a space is: on Windows its table goes when a program changes the locale.
+    constexpr std::string_view spaces = " \t\n\v\f\r";
+    const std::string_view inside = text.substr(first + 1, last - first - 1);
+    for (auto begin = inside.find_first_not_of(spaces); begin != std::string_view::npos;) {
+        const auto end = std::min(inside.find_first_of(spaces, begin), inside.size());
+        names.emplace_back(inside.substr(begin, end - begin));
+        begin = inside.find_first_not_of(spaces, end);
+    }
     return names;
 }
 
