@@ -4,6 +4,7 @@ Linux and Windows. No other module asks which system this is (tests/python/test_
 """
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -151,7 +152,7 @@ if sys.platform == "win32":
 
     def words_of(line: str) -> list[str]:
         """Of a command as a person types it. Raises ValueError for a quotation without an end."""
-        if line.replace('\\"', "").count('"') % 2:
+        if re.sub(r'\\\\|\\"', "", line).count('"') % 2:  # a backslash keeps a backslash or a quotation mark
             raise ValueError("No closing quotation")
         count = ctypes.c_int()
         found = _SPLIT(f"program {line}", ctypes.byref(count))  # the first word has rules of its own
@@ -233,7 +234,6 @@ if sys.platform == "win32":
 
 else:
     import fcntl
-    import re
     import resource
     import select
     import shlex
