@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from calibrations import calibrate, parts_of
 from json_objects import printed
+from systems import with_slashes
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -84,7 +85,7 @@ def test_mistakes_of_a_comparison_are_told_in_a_line(
     sd.Calibration(**(parts_of(calibrate(1)) | {"chain": "[w b X Y Z t]"})).write("other.csv")
     before = {path.name: path.read_bytes() for path in here.iterdir()}
     assert main(["compare", *arguments]) == 2
-    said = capsys.readouterr().err
+    said = with_slashes(capsys.readouterr().err)
     assert message in said
     assert said.count("\n") == 1
     assert {path.name: path.read_bytes() for path in here.iterdir()} == before

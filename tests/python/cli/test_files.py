@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from small_scenario import SCENARIO, of_map
+from systems import with_slashes
 from terminals import needs_terminal
 
 import stepdiag as sd
@@ -217,7 +218,7 @@ def test_empty_sheet_is_written_again_after_an_edit(here: Path, capsys: pytest.C
     Path("machine/scenario.toml").write_text(edited)
     capsys.readouterr()
     assert run("init", "-o", "machine") == 2
-    assert "init --sheet-for machine/scenario.toml -o machine" in capsys.readouterr().err
+    assert "init --sheet-for machine/scenario.toml -o machine" in with_slashes(capsys.readouterr().err)
     assert run("init", "-o", "machine", "--sheet-for", "machine/scenario.toml") == 0
     assert sd.read_measurement("machine/measurement.csv").point.max() == 12
     sheet = Path("machine/measurement.csv").read_text().splitlines()
