@@ -29,7 +29,8 @@ std::vector<std::string> links(std::string_view text) {
     const auto last = text.find_last_not_of(" \t");
     if (first == std::string_view::npos || text[first] != '[' || text[last] != ']' || first == last)
         refuse(text, "brackets [ ] are missing");
-    // Not by a stream, which asks the locale what a space is: on Windows its table goes when a program changes the locale.
+    // Not by a stream, which asks the locale what a space is: on Windows that table goes when a program changes the
+    // locale.
     constexpr std::string_view spaces = " \t\n\v\f\r";
     const std::string_view inside = text.substr(first + 1, last - first - 1);
     for (auto begin = inside.find_first_not_of(spaces); begin != std::string_view::npos;) {

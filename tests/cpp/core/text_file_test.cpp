@@ -175,9 +175,13 @@ TEST(TextFile, ModeOfAnExistingFileIsKeptAndANewOneHasThatOfAnyNewFile) {
     EXPECT_EQ(fs::status(file).permissions(), fs::status(plain).permissions());
     const auto own = fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read;
     fs::permissions(file, own);
+    const bool has_modes = fs::status(file).permissions() == own;
     stepdiag::write_text_file(file.string(), "second");
-    EXPECT_EQ(fs::status(file).permissions(), own);
+    if (has_modes) {
+        EXPECT_EQ(fs::status(file).permissions(), own);
+    }
     fs::remove_all(folder);
+    if (!has_modes) GTEST_SKIP() << "files have no modes on this system";
 }
 
 TEST(TextFile, ReadOnlyFileIsNotReplaced) {
@@ -190,6 +194,7 @@ TEST(TextFile, ReadOnlyFileIsNotReplaced) {
     fs::permissions(path, fs::perms::owner_read);
     expect_refused([&] { stepdiag::write_text_file(path, "second"); }, "the file is read-only");
     EXPECT_EQ(stepdiag::read_text_file(path), "first");
+    fs::permissions(path, fs::perms::owner_all);  // Windows removes no read-only file
     fs::remove_all(folder);
 }
 
@@ -202,6 +207,10 @@ TEST(TextFile, FileBehindALinkIsWrittenEvenWhereItIsNotThereYet) {
     fs::create_symlink("target.csv", folder / "deep" / "second");
     fs::create_symlink("no/such/folder", folder / "astray");
     fs::create_symlink("circle", folder / "circle");
+    if (!fs::is_symlink(folder / "first")) {
+        fs::remove_all(folder);
+        GTEST_SKIP() << "this system makes no symbolic links";
+    }
     for (const char* text : {"new", "changed"}) {
         stepdiag::write_text_file((folder / "first").string(), text);
         EXPECT_TRUE(fs::is_symlink(folder / "first") && fs::is_symlink(folder / "deep" / "second"));
