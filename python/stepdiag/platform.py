@@ -189,6 +189,17 @@ if sys.platform == "win32":
                     raise
                 time.sleep(_BETWEEN_RENAMES)
 
+    def let_go(handle: int) -> None:
+        """Close a file at the end of the process, so that it can be removed; its thread may be writing: no long wait."""
+
+        def close() -> None:
+            with suppress(OSError):
+                os.close(handle)
+
+        closing = threading.Thread(target=close, daemon=True)
+        closing.start()
+        closing.join(_BETWEEN_RENAMES)
+
     def sync_folder(folder: Path) -> None:
         """Windows keeps the name with the file."""
 
@@ -384,6 +395,9 @@ else:
     def replace(temporary: Path, target: Path) -> None:
         """Rename over another file."""
         os.replace(temporary, target)
+
+    def let_go(handle: int) -> None:
+        """An open file can be removed."""
 
     def sync_folder(folder: Path) -> None:
         """Sync a folder, so that the name of a new file survives a power cut."""

@@ -5,7 +5,6 @@ import os
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 
 from stepdiag import platform
@@ -129,7 +128,13 @@ def _whole_file(path: Path) -> Iterator[int]:
     # A name of its own, not mkstemp's: Ctrl-C may come between the making of the file and its return.
     temporary = target.with_name(f"{target.name}.{os.urandom(8).hex()}")
     handle = -1
-    with at_end(partial(_remove, temporary)):
+
+    def give_up() -> None:
+        if handle >= 0:
+            platform.let_go(handle)
+        _remove(temporary)
+
+    with at_end(give_up):
         try:
             with uninterrupted():
                 handle = platform.open_new(temporary)
