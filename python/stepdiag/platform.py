@@ -190,7 +190,7 @@ if sys.platform == "win32":
                 time.sleep(_BETWEEN_RENAMES)
 
     def let_go(handle: int) -> None:
-        """Close a file at the end of the process, so that it can be removed; its thread may be writing: no long wait."""
+        """Close a file as the process ends, so that it can be removed; its thread may be writing: no long wait."""
 
         def close() -> None:
             with suppress(OSError):
