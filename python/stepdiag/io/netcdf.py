@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import netCDF4
@@ -46,17 +45,17 @@ def write_netcdf(table: LabelledTable, path: Path, attributes: dict[str, Any]) -
     attributes; arrays get Fletcher-32 too, which every netCDF library checks. Raises
     InvalidArgument if the file cannot be written."""
     first = {"Conventions": "CF-1.11", "source": f"stepdiag {__version__}"} | attributes
-    table.attrs = first | table.attrs | first
-    table.attrs[_CHECKSUM] = _checksum(table.attrs, table.variables)
+    attrs = first | table.attrs | first  # the order of the first, and their values
+    attrs[_CHECKSUM] = _checksum(attrs, table.variables)
     check_output(path)
     try:
-        content = _packed(table, path)
+        content = _packed(table, attrs, path)
     except (OSError, RuntimeError) as error:  # RuntimeError: of the C libraries
         raise InvalidArgument(f"{path}: cannot be written: {_one_line(error)}") from None
     write_whole(path, content)
 
 
-def _packed(table: LabelledTable, path: Path) -> memoryview:
+def _packed(table: LabelledTable, attrs: Mapping[str, Any], path: Path) -> memoryview:
     """The content of a file, made in memory if there is room, else beside `path`: where a disk fails, the C libraries
     crash."""
     # An exception inside of the libraries leaves their locks taken.
@@ -69,19 +68,19 @@ def _packed(table: LabelledTable, path: Path) -> memoryview:
         file = netCDF4.Dataset(scratch, "w", format="NETCDF4")  # not with memory=, which forgets the variables' order
         if platform.OPEN_FILES_CAN_GO:
             scratch.unlink()
-        _dump(table, file)
+        _dump(table, attrs, file)
         file.close()
         if not platform.OPEN_FILES_CAN_GO:
             return memoryview(scratch.read_bytes())
         return memoryview(mmap.mmap(handle, 0, access=mmap.ACCESS_READ))
 
 
-def _dump(table: LabelledTable, file: netCDF4.Dataset) -> None:
+def _dump(table: LabelledTable, attrs: Mapping[str, Any], file: netCDF4.Dataset) -> None:
     """By the CF conventions: a variable names its coordinates, the table those of no variable."""
     along = {name for name in table.coordinates if table.variables[name].dims == (name,)}
     others = {name: set(table.variables[name].dims) for name in sorted(table.coordinates - along)}
     unnamed = set(others)
-    for name, (dims, values, attrs) in table.variables.items():
+    for name, (dims, values, stated) in table.variables.items():
         own = {}
         if name not in table.coordinates:
             named = [other for other, needed in others.items() if needed <= {*dims}]
@@ -96,9 +95,9 @@ def _dump(table: LabelledTable, file: netCDF4.Dataset) -> None:
                 file.createDimension(dimension, length)
         variable = file.createVariable(name, values.dtype, dims, fletcher32=bool(dims), fill_value=fill)
         variable.set_auto_maskandscale(False)
-        variable.setncatts({**attrs, **own})
+        variable.setncatts({**stated, **own})
         variable[...] = values
-    file.setncatts(table.attrs | ({"coordinates": " ".join(sorted(unnamed))} if unnamed else {}))
+    file.setncatts({**attrs, **({"coordinates": " ".join(sorted(unnamed))} if unnamed else {})})
 
 
 def _characters(texts: npt.NDArray[Any]) -> npt.NDArray[np.bytes_]:
@@ -140,19 +139,14 @@ def read_netcdf(path: Path) -> "NetcdfFile":
 
 def _loaded(file: netCDF4.Dataset) -> tuple[LabelledTable, dict[str, str]]:
     """What is in a file, and why variables cannot be read."""
-    file.set_auto_maskandscale(False)
-    file.set_auto_chartostring(False)
-    table = LabelledTable({}, {}, _attributes(file))
-    damaged = {}
+    table, damaged = LabelledTable({}, {}, _attributes(file)), {}
     for name, variable in file.variables.items():
-        dims, values = variable.dimensions, np.empty(0)
-        attrs = _attributes(variable)
+        values = np.empty(0)
         try:
-            values = _decoded(np.asarray(variable[...]), variable)
-            dims = dims[: values.ndim]
+            values = _values(variable)
         except Exception as error:  # such as a wrong checksum
             damaged[name] = _one_line(error)
-        table.variables[name] = LabelledArray(dims, values, attrs)
+        table.variables[name] = LabelledArray(variable.dimensions[: values.ndim], values, _attributes(variable))
     return table, damaged
 
 
@@ -160,38 +154,26 @@ def _attributes(of: Any) -> dict[str, Any]:
     return {name: of.getncattr(name) for name in of.ncattrs() if name not in _OF_STORAGE}
 
 
-def _decoded(values: npt.NDArray[Any], variable: Any) -> npt.NDArray[Any]:
-    """Values as they are meant: characters are texts, a mark of missing ones is NaN, packed numbers are unpacked."""
-    stored = {name: variable.getncattr(name) for name in variable.ncattrs() if name in _OF_STORAGE}
-    if values.dtype == "S1":
-        if values.ndim:
-            width = values.shape[-1]
-            values = (
-                np.ascontiguousarray(values).view(f"S{max(width, 1)}").reshape(values.shape[:-1])
-                if width
-                else (np.zeros(values.shape[:-1], "S1"))
-            )
-        return np.char.decode(values, str(stored["_Encoding"])) if "_Encoding" in stored else values
-    if values.dtype.kind not in "fiu":
-        return values
-    marks = [mark for name in ("_FillValue", "missing_value") for mark in np.atleast_1d(stored.get(name, []))]
-    missing = np.isin(values, marks)
-    if marks and (values.dtype.kind != "f" or missing.any()):
-        values = values.astype(np.float64)
-        values[missing] = np.nan
-    if "scale_factor" in stored or "add_offset" in stored:
-        values = values * np.float64(stored.get("scale_factor", 1.0)) + np.float64(stored.get("add_offset", 0.0))
-    return values
+def _values(variable: "netCDF4.Variable[Any]") -> npt.NDArray[Any]:
+    """As the library decodes them; missing numbers are NaN, and characters whose encoding is not named are texts,
+    too."""
+    variable.set_auto_maskandscale(variable.dtype != "S1")
+    values = np.asanyarray(variable[...])
+    if values.dtype == "S1" and values.ndim:
+        return np.asarray(netCDF4.chartostring(values, encoding="bytes"))
+    if np.ma.is_masked(values) and values.dtype.kind in "fiu":
+        return np.asarray(values.astype(np.float64).filled(np.nan))
+    return np.asarray(np.ma.getdata(values))
 
 
 class NetcdfFile:
     """Checked access to the variables and attributes of a file."""
 
-    def __init__(self, path: Path, table: LabelledTable, damaged: Mapping[str, str] = MappingProxyType({})) -> None:
+    def __init__(self, path: Path, table: LabelledTable, damaged: Mapping[str, str] | None = None) -> None:
         """`damaged`: why variables cannot be read."""
         self.path = path
         self._table = table
-        self._damaged = damaged
+        self._damaged = damaged or {}
 
     def check_format(self, expected: str) -> None:
         """Check the attribute `format`, which files of other programs may lack. Raises InvalidArgument."""

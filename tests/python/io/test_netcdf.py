@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,6 +18,7 @@ from usual import CHAIN, DIAGONALS
 import stepdiag as sd
 from stepdiag.findings.undetermined import combination_text
 from stepdiag.io.data_files import write_calibration
+from stepdiag.io.netcdf import read_netcdf
 
 
 @pytest.fixture(scope="module")
@@ -282,3 +284,24 @@ def test_threads_read_and_write_at_once(tmp_path: Path, adjustment: tuple[sd.Adj
 
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(work, range(4))) == [None] * 4
+
+
+def test_numbers_that_others_have_packed_are_what_xarray_reads(tmp_path: Path) -> None:
+    path = tmp_path / "packed.nc"
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("x", 4)
+        for name, kind, attributes in (
+            ("scaled", "i2", {"scale_factor": 1e-5, "add_offset": 0.25}),
+            ("unsigned", "i1", {"_Unsigned": "true"}),
+            ("single", "f4", {"missing_value": np.float32(3.0)}),
+        ):
+            variable = file.createVariable(name, kind, ("x",), fill_value=7)
+            variable.set_auto_maskandscale(False)
+            variable.setncatts(attributes)
+            variable[:] = [1, 7, -3, 3] if kind != "f4" else [1.5, 7.0, -3.0, 3.0]
+    found = read_netcdf(path)
+    with xr.open_dataset(path) as expected:
+        for name in ("scaled", "unsigned", "single"):
+            values = found.numbers(name, ["x"], None, missing=True)
+            np.testing.assert_allclose(values, expected[name].values, rtol=1e-7)  # xarray unpacks in single precision
+            assert np.isnan(values[1])
