@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pefile
 
+# What Wine has of its own, Tcl, and what calls a function that Wine lacks; Python does without it.
+LEFT_OUT = ("api-ms-", "tcl", "tk", "_tkinter", "_wmi")
+
 
 def main(wheel: Path, source: Path, folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
@@ -19,7 +22,7 @@ def main(wheel: Path, source: Path, folder: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         for name in archive.namelist():
             plain = name.rpartition("/")[2]
-            if not name.startswith("deploy_libs/") or plain.startswith(("api-ms-", "tcl", "tk", "_tkinter")):
+            if not name.startswith("deploy_libs/") or plain.startswith(LEFT_OUT):
                 continue
             place = folder if plain.lower().startswith(("python3", "vcruntime")) else folder / "DLLs"
             (place / plain).write_bytes(archive.read(name))
