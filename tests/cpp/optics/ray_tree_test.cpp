@@ -60,7 +60,8 @@ TEST(RayTree, SplittingFaceSendsLightBothWays) {
     EXPECT_EQ(tree.absorbed, 0.2);
     EXPECT_EQ(on.index, glass.index);
     EXPECT_EQ(back.index, air.index);
-    EXPECT_LT((on.ray.direction - *refract(down, Vector3d::UnitZ(), air.index / glass.index)).norm(), direction_rounding);
+    EXPECT_LT((on.ray.direction - *refract(down, Vector3d::UnitZ(), air.index / glass.index)).norm(),
+              direction_rounding);
     EXPECT_LT((back.ray.direction - Vector3d(0.6, 0.0, 0.8)).norm(), direction_rounding);
 }
 
