@@ -3,6 +3,7 @@
 Linux and Windows. No other module asks which system this is (tests/python/test_platform.py).
 """
 
+import functools
 import os
 import re
 import signal
@@ -229,6 +230,11 @@ if sys.platform == "win32":
     def of_pipe(pipe: IO[bytes]) -> "Unblocked | DirectPipe":
         return Unblocked(lambda size: os.read(pipe.fileno(), size))
 
+    @functools.cache  # its thread has read what others would wait for
+    def of_standard_input(number: int) -> "Unblocked | DirectPipe":
+        """What is typed, or comes by a pipe, to be waited for; `number` is its descriptor."""
+        return Unblocked(lambda size: os.read(number, size))
+
     def never_blocks(pipe: IO[bytes]) -> None:
         """Windows's pipes wait for a program that does not read."""
 
@@ -439,6 +445,10 @@ else:
         os.set_blocking(pipe.fileno(), False)
         return DirectPipe(pipe.fileno())
 
+    def of_standard_input(number: int) -> "Unblocked | DirectPipe":
+        """What is typed, or comes by a pipe, to be waited for; `number` is its descriptor."""
+        return DirectPipe(number)  # blocks, for the terminal is the shell's, too: read it when a selector says so
+
     def never_blocks(pipe: IO[bytes]) -> None:
         """Writing raises BlockingIOError where a program does not read."""
         os.set_blocking(pipe.fileno(), False)
@@ -459,7 +469,7 @@ else:
 
 # --- streams ---------------------------------------------------------------------------------------------------------
 class DirectPipe:
-    """A descriptor that does not block, and that a selector takes."""
+    """A descriptor that a selector takes."""
 
     def __init__(self, handle: int) -> None:
         self._handle = handle

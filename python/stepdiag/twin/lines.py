@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import selectors
 import threading
 import time
@@ -74,7 +73,7 @@ def send_lines(
     ended: threading.Event | None = None,
     goes_on: bool = False,
 ) -> None:
-    """Send samples without end, and answer what comes from `source`, a file or socket.
+    """Send samples without end, and answer what comes from `source`, which has `fileno` and `read`.
 
     Stops when sending fails, when `ended` is set, and at the end of `source`, unless it `goes_on`."""
 
@@ -90,7 +89,7 @@ def send_lines(
             if not selector.get_map():
                 time.sleep(BETWEEN_SAMPLES)
             elif selector.select(BETWEEN_SAMPLES):
-                data = os.read(source.fileno(), 4096)
+                data = source.read(4096)
                 if not data and not goes_on:
                     return
                 if not data:

@@ -294,7 +294,8 @@ class _LineClient(socketserver.BaseRequestHandler):
     def handle(self) -> None:
         assert isinstance(self.server, _Server)
         self.request.settimeout(SLOW)  # a client that does not read is dropped
-        send_lines(self.server.sender, self.request, self.request.sendall, ended=self.server.ended)
+        with self.request.makefile("rb", buffering=0) as requests:
+            send_lines(self.server.sender, requests, self.request.sendall, ended=self.server.ended)
 
 
 def _done(action: Callable[[], None]) -> list[Any]:

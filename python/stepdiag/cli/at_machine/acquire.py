@@ -295,10 +295,11 @@ def twin(
 
 
 def _to_standard_output(running: "Twin") -> None:
+    from stepdiag.platform import of_standard_input
     from stepdiag.twin.lines import LineSender, send_lines
 
     def send(line: bytes) -> None:
         sys.stdout.buffer.write(line)
         sys.stdout.buffer.flush()
 
-    send_lines(LineSender(running.instrument), sys.stdin, send, goes_on=True)
+    send_lines(LineSender(running.instrument), of_standard_input(sys.stdin.fileno()), send, goes_on=True)

@@ -13,6 +13,7 @@ from stepdiag.acquisition.control import Control
 from stepdiag.acquisition.live_state import LiveState
 from stepdiag.cli.options import in_flags
 from stepdiag.cli.terminal import plain
+from stepdiag.platform import of_standard_input
 
 BETWEEN_LINES: Final = 0.2  # s between two states on a terminal
 BAR: Final = 20  # columns
@@ -139,8 +140,9 @@ class Terminal(Watched):
             if not line:
                 raise InvalidArgument(ended) from None
             return line
-        if b"\n" not in self._typed and select.select([number], [], [], 0.0)[0]:
-            data = os.read(number, 4096)
+        typed = of_standard_input(number)
+        if b"\n" not in self._typed and select.select([typed], [], [], 0.0)[0]:
+            data = typed.read(4096)
             if not data:
                 raise InvalidArgument(ended)
             self._typed += data
