@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, NoReturn
 
-from pydantic import PlainValidator
+from pydantic import PlainSerializer, PlainValidator
 from pydantic_core import PydanticCustomError
 
 from stepdiag.config.key_errors import OWN_WORDS, show, suggest
@@ -21,9 +21,11 @@ class InputLimits:
     inner: Range | None = None
     outer: Range | None = None
 
+    def stated(self) -> dict[str, Range]:
+        return {name: value for name, value in vars(self).items() if value is not None}
+
     def __str__(self) -> str:
-        stated = {name: value for name, value in vars(self).items() if value is not None}
-        return show(stated, longest=200)
+        return show(self.stated(), longest=200)
 
 
 def _fail(said: str, below: str = "") -> NoReturn:
@@ -53,7 +55,7 @@ def _limits(value: Any) -> InputLimits:
 
 
 LIMITS: Final = "{inner = [LOW, HIGH], outer = [LOW, HIGH]}, or one of the two"
-Limits = Annotated[InputLimits, PlainValidator(_limits)]
+Limits = Annotated[InputLimits, PlainValidator(_limits), PlainSerializer(InputLimits.stated)]
 
 
 def _limit(meaning: str, inner: Range | None, outer: Range | None) -> Any:
