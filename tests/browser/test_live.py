@@ -2,7 +2,6 @@
 
 import json
 import re
-import signal
 import socket
 import subprocess
 import sys
@@ -108,7 +107,7 @@ def twin(folder: Path) -> Iterator[str]:
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     yield process.stdout.readline().split()[2]
-    process.send_signal(signal.SIGINT)
+    process.terminate()  # a background shell ignores SIGINT
     process.wait(20.0)
 
 
