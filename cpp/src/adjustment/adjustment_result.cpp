@@ -107,11 +107,17 @@ void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& for
         throw InvalidArgument("full_covariance: expected at most " + std::to_string(largest_covariance) +
                               " values, the run gives " + std::to_string(size) + "; the variances need none");
     Eigen::MatrixXd covariance(size, size);
-    for (Eigen::Index j = 0; j < size; ++j) {
-        Eigen::VectorXd column = Eigen::VectorXd::Zero(problem.size());
-        for (int i = 0; i < list[j]->size; ++i) column[list[j]->unknown[i]] += list[j]->coefficient[i];
-        factor.solve(column);
-        for (Eigen::Index i = 0; i < size; ++i) covariance(i, j) = list[i]->value(column);
+    BorderedFactor::Sides columns(problem.size(), BorderedFactor::sides);
+    for (Eigen::Index first = 0; first < size; first += BorderedFactor::sides) {
+        const Eigen::Index count = std::min<Eigen::Index>(BorderedFactor::sides, size - first);
+        columns.setZero();
+        for (Eigen::Index j = 0; j < count; ++j) {
+            const LinearForm& form = *list[first + j];
+            for (int i = 0; i < form.size; ++i) columns(form.unknown[i], j) += form.coefficient[i];
+        }
+        factor.solve(columns);
+        for (Eigen::Index i = 0; i < size; ++i)
+            covariance.row(i).segment(first, count) = list[i]->values(columns).head(count);
     }
     Eigen::VectorXd to_stated(size);  // of each value: its standard uncertainty over that of the solutions
     Eigen::Index next = 0;

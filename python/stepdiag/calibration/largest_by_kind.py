@@ -69,8 +69,8 @@ def largest_entries(calibration: Calibration, *, uncertainty: bool = False) -> d
             largest[kind], sizes[kind] = entry, size
 
     for name, (position, value, u) in calibration.functions.items():
-        known = np.nan_to_num(np.abs(u if uncertainty else value), nan=-1.0)
-        k = int(np.argmax(known))
+        known = np.abs(u if uncertainty else value)
+        k = int(np.argmax(np.where(np.isnan(known), -1.0, known)))
         note(LargestEntry(name, float(position[k]), float(value[k]), float(u[k])))
     for name, (angle, u_angle) in calibration.squareness.items():
         note(LargestEntry(name, None, angle, u_angle))

@@ -6,8 +6,9 @@
 2. For each setting, and for some times around the available one (and for the shortest one), lines are exchanged as
    in optimum experimental design: of all sets with one line more, one less, or one in place of another, that best set
    is taken which is better than the present one; until there is none (V. V. Fedorov, Theory of Optimal Experiments,
-   1972; R. D. Cook and C. J. Nachtsheim, Technometrics 22 (1980) 315). The order of lines and settings is fixed, and
-   numbers that differ in the seventh digit are equal: the same scenario gives the same plan.
+   1972; R. D. Cook and C. J. Nachtsheim, Technometrics 22 (1980) 315). A set that would not be the best one even if
+   nothing had been taken off is passed over. The order of lines and settings is fixed, and numbers that differ in the
+   seventh digit are equal: the same scenario gives the same plan.
 3. In step 2 a plan is estimated from the exact covariances of 5 and of 10 steps (of more where the mirror is too small
    for so long ones), without repeats. The variance of a value is a constant plus a sum over steps (a random walk), and
    so it is taken as linear in their number, at every point of the volume and for every kind of parameter, and beyond 10
@@ -22,8 +23,9 @@ A plan that determines fewer parameters is never better than one that determines
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
@@ -62,7 +64,11 @@ REFINED: Final = 2  # plans that are exchanged by exact covariances
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
-Order = Callable[[Candidate], tuple[float, ...]]
+Rank = tuple[float, ...]  # of two plans, the one with the smaller is the better one
+# Of a candidate, were it as good as the second one.
+Order = Callable[[Candidate, Candidate], Rank]
+# At most a candidate's rank. All its lines are some of those of the second one.
+Bound = Callable[[Candidate, Candidate | None], Rank]
 
 
 def best_plans(
@@ -131,7 +137,7 @@ class _Search:
         setting has been evaluated then."""
         order = self._by_estimates(self.aim)
         best = [self._best(setting, starts, order) for setting in self._near(combined)]
-        for candidate in sorted(best, key=order):
+        for candidate in sorted(best, key=lambda one: order(one, one)):
             self.evaluated(candidate)
         taken = choose(list(self.exact.values()), self.aim).taken
         return (taken or self.evaluated(self.own)).minutes
@@ -144,13 +150,12 @@ class _Search:
 
     def _refine(self) -> None:
         """Exchanges by exact covariances, of plans with nodes as near as the time allows."""
-        order = self._by_evaluations(self.aim)
         found = complete(list(self.exact.values()))
         taken = choose(found, self.aim).taken
         spacing = self.aim.spacing if taken is None else max(self.aim.spacing, taken.spacing)
         allowed = [o for o in found if o.spacing <= spacing * (1.0 + 1e-9)]
         for one in sorted(allowed, key=self.aim.order)[:REFINED]:
-            self._exchanged(one.candidate, order, self._by_estimates(self.aim, SLACK))
+            self._exchanged(one.candidate, self._by_evaluations, self._of_estimate())
 
     # --- exchanges ---------------------------------------------------------------------------------------------------
     def _starts(self) -> list[tuple[tuple[str, ...], ...]]:
@@ -161,30 +166,43 @@ class _Search:
     def _best(self, setting: Candidate, starts: Sequence[tuple[tuple[str, ...], ...]], order: Order) -> Candidate:
         """Of a setting, from the best of the starts."""
         found = [normal(replace(setting, lines=lines, scale_lines=scales)) for lines, scales in starts]
-        return self._exchanged(min(found, key=order), order)
+        return self._exchanged(min(found, key=lambda one: order(one, one)), order, self._of_whole(order))
 
-    def _exchanged(self, candidate: Candidate, order: Order, preferred: Order | None = None) -> Candidate:
-        """`preferred`: a cheap order, by which a candidate that is not before the present one is passed over."""
-        own = order(candidate)
+    def _exchanged(self, candidate: Candidate, order: Order, bound: Bound) -> Candidate:
+        """Those that cannot be best are passed over; of equal ones the first is taken."""
+        own = order(candidate, candidate)
         while True:
-            others = [one for one in self._neighbours(candidate) if preferred is None or preferred(one) < own]
-            best = min(others, key=order, default=candidate)
-            if order(best) >= own:
+            best = (own, -1, candidate)
+            bounds = [(bound(*pair), place, pair[0]) for place, pair in enumerate(self._neighbours(candidate))]
+            for least, place, one in sorted(bounds, key=itemgetter(0, 1)):
+                if least > best[0]:
+                    break
+                best = min(best, (order(one, one), place, one), key=itemgetter(0, 1))
+            if best[2] is candidate:
                 return candidate
-            candidate, own = best, order(best)
+            own, _, candidate = best
 
-    def _neighbours(self, candidate: Candidate) -> Iterator[Candidate]:
-        """With one line more, one less, or one in place of another."""
+    def _neighbours(self, candidate: Candidate) -> Iterator[tuple[Candidate, Candidate | None]]:
+        """With one line more, one less, or one in place of another; and what that is with both, if it is a plan."""
         inside = {(line, False) for line in candidate.lines} | {(line, True) for line in candidate.scale_lines}
         every = [(line, False) for line in self.lines] + [(line, True) for line in self.scales]
         outside = [one for one in every if one not in inside]
         for added in [None, *outside]:
+            more = inside | ({added} if added else set())
+            whole = self._of(candidate, more)
             for removed in [None, *(one for one in every if one in inside)]:
-                chosen = (inside | ({added} if added else set())) - {removed}
-                lines = tuple(line for line in self.lines if (line, False) in chosen)
-                scales = tuple(line for line in self.scales if (line, True) in chosen)
-                if chosen != inside and lines and not {*lines} & {*scales}:
-                    yield normal(replace(candidate, lines=lines, scale_lines=scales))
+                chosen = more - {removed}
+                one = self._of(candidate, chosen)
+                if one is not None and chosen != inside:
+                    yield one, whole
+
+    def _of(self, setting: Candidate, chosen: Collection[tuple[str, bool]]) -> Candidate | None:
+        """Of a setting, with these lines, if they make a plan; with each stands whether it is a scale line."""
+        lines = tuple(line for line in self.lines if (line, False) in chosen)
+        scales = tuple(line for line in self.scales if (line, True) in chosen)
+        if not lines or {*lines} & {*scales}:
+            return None
+        return normal(replace(setting, lines=lines, scale_lines=scales))
 
     # --- what plans take and give ------------------------------------------------------------------------------------
     def seconds(self, candidate: Candidate) -> float:
@@ -258,13 +276,14 @@ class _Search:
 
     # --- orders ------------------------------------------------------------------------------------------------------
     def _by_estimates(self, aim: Aim, slack: float = 1.0) -> Order:
-        def order(candidate: Candidate) -> tuple[float, ...]:
+        def order(candidate: Candidate, like: Candidate) -> Rank:
             seconds = self.seconds(candidate)
             if seconds > aim.minutes * MINUTE:  # however good it is
                 return (math.inf, seconds)
-            found = self.estimated(candidate)
+            found = self.estimated(like)
             smaller = replace(
                 found,
+                seconds=seconds,
                 volume=found.volume / slack,
                 largest={kind: u / slack for kind, u in found.largest.items()},
             )
@@ -272,19 +291,30 @@ class _Search:
 
         return order
 
-    def _by_evaluations(self, aim: Aim) -> Order:
-        def order(candidate: Candidate) -> tuple[float, ...]:
-            found = self.evaluated(candidate)
-            return (self._lacking(found), *aim.order(found))
+    def _by_evaluations(self, candidate: Candidate, like: Candidate) -> Rank:
+        found = self.evaluated(like)
+        return (self._lacking(found), *self.aim.order(replace(found, seconds=self.seconds(candidate))))
 
-        return order
-
-    def _by_time(self, candidate: Candidate) -> tuple[float, ...]:
-        return (self._lacking(self.estimated(candidate)), self.seconds(candidate))
+    def _by_time(self, candidate: Candidate, like: Candidate) -> Rank:
+        return (self._lacking(self.estimated(like)), self.seconds(candidate))
 
     def _lacking(self, one: Outcome) -> float:
         """How many parameters it does not determine that another plan does; of fewer no plan is better."""
         return float(-len(one.determined))
+
+    def _of_whole(self, order: Order) -> Bound:
+        """Who measures less knows nothing better, but may have fewer faults to distinguish."""
+
+        def bound(candidate: Candidate, whole: Candidate | None) -> Rank:
+            if self.faults or whole is None or self.estimated(whole).trouble:  # such as a mirror too small
+                return (-math.inf,)
+            return order(candidate, whole)
+
+        return bound
+
+    def _of_estimate(self) -> Bound:
+        order = self._by_estimates(self.aim, SLACK)
+        return lambda candidate, whole: order(candidate, candidate)
 
 
 def _with_others(own: Sequence[str], usual: Sequence[str]) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from stepdiag.parameters import Kind
 from stepdiag.planning.fault_control import distinguishes_all
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import extents, not_measured
-from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
+from stepdiag.scenario.description import Scenario, adjusted_numbers, simulate_scenario
 from stepdiag.scenario.known import Known, runs_of
 from stepdiag.scenario.truth import Truth, truth_of
 from stepdiag.units import MICROMETRE, MICRORADIAN, MINUTE
@@ -342,7 +342,7 @@ def evaluate(scenario: Scenario, candidate: Candidate, between: float, *, faults
         controls = None
         if faults or not more:
             run = simulate_scenario(usual)
-            adjusted = adjust_scenario(
+            adjusted = adjusted_numbers(
                 usual.known, run, full_covariance=not more, reliability=faults, search_faults=False
             )
             calibration = adjusted.calibration

@@ -15,7 +15,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.calibration.evaluations import adjust, evaluate, in_words
+from stepdiag.calibration.evaluations import evaluate, in_words
 from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
@@ -279,8 +279,30 @@ def _adjusted(
     reliability: bool = False,
     search_faults: bool = True,
 ) -> _core.Adjustment:
+    found = in_words(
+        adjusted_numbers(
+            known,
+            measurement,
+            full_covariance=full_covariance,
+            reliability=reliability,
+            search_faults=search_faults,
+        )
+    )
+    return found.with_calibration(found.calibration.with_conditions(*_words(found.calibration, known, measurement)))
+
+
+def adjusted_numbers(
+    known: Known,
+    measurement: _core.Measurement,
+    *,
+    full_covariance: bool = False,
+    reliability: bool = False,
+    search_faults: bool = True,
+) -> _core.Adjustment:
+    """As `adjust_scenario`, without sentences and without a look at what no workshop has: for many runs that nobody has
+    measured."""
     _check_memory(known, measurement, full_covariance)
-    found = adjust(
+    return _core.adjust(
         _reduced(known, measurement),
         known.plan,
         of_run(known.heads),
@@ -294,7 +316,6 @@ def _adjusted(
             search_faults=search_faults,
         ),
     )
-    return found.with_calibration(found.calibration.with_conditions(*_words(found.calibration, known, measurement)))
 
 
 def _check_memory(known: Known, measurement: _core.Measurement, full_covariance: bool) -> None:
