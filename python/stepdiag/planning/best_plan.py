@@ -306,9 +306,13 @@ class _Search:
         """Who measures less knows nothing better, but may have fewer faults to distinguish."""
 
         def bound(candidate: Candidate, whole: Candidate | None) -> Rank:
-            if self.faults or whole is None or self.estimated(whole).trouble:  # such as a mirror too small
-                return (-math.inf,)
-            return order(candidate, whole)
+            unknown = (-math.inf,)
+            if self.faults or whole is None:
+                return unknown
+            rank = order(candidate, whole)
+            if rank[0] < math.inf and self.estimated(whole).trouble:  # such as a mirror too small
+                return unknown
+            return rank
 
         return bound
 
