@@ -271,23 +271,8 @@ def adjust_scenario(
     return in_words(_core.judge(adjustment, implausible_inputs=implausible)) if implausible else adjustment
 
 
-def _adjusted(
-    known: Known,
-    measurement: _core.Measurement,
-    *,
-    full_covariance: bool = False,
-    reliability: bool = False,
-    search_faults: bool = True,
-) -> _core.Adjustment:
-    found = in_words(
-        adjusted_numbers(
-            known,
-            measurement,
-            full_covariance=full_covariance,
-            reliability=reliability,
-            search_faults=search_faults,
-        )
-    )
+def _adjusted(known: Known, measurement: _core.Measurement, **choices: bool) -> _core.Adjustment:
+    found = in_words(adjusted_numbers(known, measurement, **choices))
     return found.with_calibration(found.calibration.with_conditions(*_words(found.calibration, known, measurement)))
 
 
