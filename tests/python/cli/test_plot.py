@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from systems import with_slashes
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -92,7 +93,7 @@ def test_without_a_name_it_writes_beside_the_first_file_and_says_so(
     (here / "folder").mkdir()
     shutil.move("a.csv", "folder/a.csv")
     assert main(["plot", "folder/a.csv", "map.csv"]) == 0
-    assert capsys.readouterr().out == "wrote folder/a.png\n"
+    assert with_slashes(capsys.readouterr().out) == "wrote folder/a.png\n"
     first = Path("folder/a.png").read_bytes()
     assert main(["plot", "folder/a.csv"]) == 0, "its own older figure is replaced"
     assert Path("folder/a.png").read_bytes() != first
