@@ -1,5 +1,6 @@
 """Reads and writes small files, completely or not at all."""
 
+import errno
 import glob
 import os
 import stat
@@ -220,4 +221,6 @@ def make_folder(path: Path) -> None:
 
 
 def reason(error: Exception) -> str:
+    if isinstance(error, FileNotFoundError):  # in the words that the core has; Windows has its own, in its language
+        return os.strerror(errno.ENOENT)
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
