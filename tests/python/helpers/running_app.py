@@ -9,8 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-# That of another system, under Wine: cross/test_windows.
-PROGRAM = shlex.split(os.environ.get("STEPDIAG_PROGRAM", "")) or [sys.executable, "-m", "stepdiag"]
+# That of Windows, under Wine: cross/test_windows.
+WINDOWS = shlex.split(os.environ.get("STEPDIAG_PROGRAM", ""))
+PROGRAM = WINDOWS or [sys.executable, "-m", "stepdiag"]
+PATIENCE = 20_000 * (6 if WINDOWS else 1)  # ms, for what starts a command; Wine starts Python in ten seconds
 
 
 class Running:
@@ -29,6 +31,8 @@ class Running:
         assert found is not None, said
         self.address = found[0]
 
-    def end(self) -> int:
-        self.process.send_signal(signal.SIGINT)
-        return self.process.wait(20.0)
+    def end(self) -> None:
+        """By Ctrl-C, which Wine passes on to consoles alone."""
+        self.process.send_signal(signal.SIGTERM if WINDOWS else signal.SIGINT)
+        status = self.process.wait(20.0)
+        assert status == 130 or WINDOWS
