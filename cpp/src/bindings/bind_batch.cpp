@@ -28,9 +28,11 @@ std::vector<std::string> signal_names(const Measurement& measurement) {
     return names;
 }
 
-std::unique_ptr<EvaluatorOfPattern> make(const Measurement& pattern, const Plan& plan, const HeadLike& heads,
-                                         const ChainLike& chain, const ArrayLike& tool, const std::string& method,
-                                         const std::optional<AdjustmentOptions>& given, const Fields& fields) {
+std::unique_ptr<EvaluatorOfPattern> make_evaluator(const Measurement& pattern, const Plan& plan, const HeadLike& heads,
+                                                   const ChainLike& chain, const ArrayLike& tool,
+                                                   const std::string& method,
+                                                   const std::optional<AdjustmentOptions>& given,
+                                                   const Fields& fields) {
     const BatchOptions options = to_batch_options(method, options_of(given, fields));
     const HeadCalibrations calibrations = to_heads(heads, plan).calibration();
     const Chain kinematics = to_chain(chain);
@@ -136,7 +138,7 @@ void bind_batch(py::module_& m) {
                           "One evaluation of many sets of readings of the same plan, heads and pattern of readings; "
                           "what is known of the pattern serves all of them.")
         .def(
-            py::init(&make), py::arg("pattern"), py::arg("plan"), py::arg("heads"), py::arg("chain"),
+            py::init(&make_evaluator), py::arg("pattern"), py::arg("plan"), py::arg("heads"), py::arg("chain"),
             py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "enhanced",
             py::arg("options") = std::nullopt,
             "pattern: a run whose readings are there; lost ones are not used in any set. method: \"conventional\", "

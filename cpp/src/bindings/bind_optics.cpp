@@ -26,8 +26,8 @@ std::vector<Face> coated(std::vector<Face> faces, double reflectance) {
     return faces;
 }
 
-HeadBody make(const std::string& name, std::vector<Face> faces, const Material& material, const ArrayLike& position,
-              const ArrayLike& rotation) {
+HeadBody make_part(const std::string& name, std::vector<Face> faces, const Material& material,
+                   const ArrayLike& position, const ArrayLike& rotation) {
     return {name, std::move(faces), material, to_placement(position, rotation)};
 }
 
@@ -68,8 +68,8 @@ void bind_optics(py::module_& m) {
             "plate",
             [](const std::string& name, double width, double height, double thickness, const MaterialLike& material,
                const ArrayLike& place, const ArrayLike& turn, double share) {
-                return make(name, coated(make_plate(width, height, thickness, glass), share), to_material(material),
-                            place, turn);
+                return make_part(name, coated(make_plate(width, height, thickness, glass), share),
+                                 to_material(material), place, turn);
             },
             py::arg("name"), py::kw_only(), py::arg("width"), py::arg("height"), py::arg("thickness"),
             py::arg("material"), position, rotation, reflectance, "Plate: origin in the middle, thickness along z.")
@@ -77,8 +77,8 @@ void bind_optics(py::module_& m) {
             "wedge",
             [](const std::string& name, double width, double height, double thickness, double angle,
                const MaterialLike& material, const ArrayLike& place, const ArrayLike& turn, double share) {
-                return make(name, coated(make_wedge(width, height, thickness, angle, glass), share),
-                            to_material(material), place, turn);
+                return make_part(name, coated(make_wedge(width, height, thickness, angle, glass), share),
+                                 to_material(material), place, turn);
             },
             py::arg("name"), py::kw_only(), py::arg("width"), py::arg("height"), py::arg("thickness"), py::arg("angle"),
             py::arg("material"), position, rotation, reflectance,
@@ -87,8 +87,8 @@ void bind_optics(py::module_& m) {
             "cube_splitter",
             [](const std::string& name, double edge, const MaterialLike& material, double share, double absorptance,
                const ArrayLike& place, const ArrayLike& turn) {
-                return make(name, make_cube_splitter(edge, glass, share, absorptance), to_material(material), place,
-                            turn);
+                return make_part(name, make_cube_splitter(edge, glass, share, absorptance), to_material(material),
+                                 place, turn);
             },
             py::arg("name"), py::kw_only(), py::arg("edge"), py::arg("material"), py::arg("reflectance") = 0.5,
             py::arg("absorptance") = 0.0, position, rotation,
@@ -98,8 +98,8 @@ void bind_optics(py::module_& m) {
             "right_angle_prism",
             [](const std::string& name, double side, double height, const MaterialLike& material,
                const ArrayLike& place, const ArrayLike& turn, double share) {
-                return make(name, coated(make_prism(side, height, 0.5 * pi, glass), share), to_material(material),
-                            place, turn);
+                return make_part(name, coated(make_prism(side, height, 0.5 * pi, glass), share), to_material(material),
+                                 place, turn);
             },
             py::arg("name"), py::kw_only(), py::arg("side"), py::arg("height"), py::arg("material"), position, rotation,
             reflectance, "Right-angle prism: origin in the middle of the hypotenuse, the right angle on +z.")
@@ -107,20 +107,21 @@ void bind_optics(py::module_& m) {
             "corner_cube",
             [](const std::string& name, double depth, const MaterialLike& material, const ArrayLike& place,
                const ArrayLike& turn, double share) {
-                return make(name, coated(make_corner_cube(depth, glass), share), to_material(material), place, turn);
+                return make_part(name, coated(make_corner_cube(depth, glass), share), to_material(material), place,
+                                 turn);
             },
             py::arg("name"), py::kw_only(), py::arg("depth"), py::arg("material"), position, rotation, reflectance,
             "Corner cube: origin in the corner, light enters at z = depth along -z.")
         .def_static(
             "mirror",
             [](const std::string& name, double width, double height, double share, const ArrayLike& place,
-               const ArrayLike& turn) { return make(name, make_mirror(width, height, share), 1.0, place, turn); },
+               const ArrayLike& turn) { return make_part(name, make_mirror(width, height, share), 1.0, place, turn); },
             py::arg("name"), py::kw_only(), py::arg("width"), py::arg("height"), py::arg("reflectance") = 1.0, position,
             rotation, "A mirror in its own x-y plane, reflecting on both sides.")
         .def_static(
             "screen",
             [](const std::string& name, double width, double height, const ArrayLike& place, const ArrayLike& turn) {
-                return make(name, make_screen(width, height), 1.0, place, turn);
+                return make_part(name, make_screen(width, height), 1.0, place, turn);
             },
             py::arg("name"), py::kw_only(), py::arg("width"), py::arg("height"), position, rotation,
             "A screen in its own x-y plane that absorbs all light.")
@@ -131,7 +132,8 @@ void bind_optics(py::module_& m) {
                 const Points points = to_points(corners, "corners");
                 std::vector<Eigen::Vector3d> list;
                 for (Eigen::Index k = 0; k < points.rows(); ++k) list.push_back(points.row(k));
-                return make(name, coated(make_body(list, faces, glass), share), to_material(material), place, turn);
+                return make_part(name, coated(make_body(list, faces, glass), share), to_material(material), place,
+                                 turn);
             },
             py::arg("name"), py::kw_only(), py::arg("corners"), py::arg("faces"), py::arg("material"), position,
             rotation, reflectance,

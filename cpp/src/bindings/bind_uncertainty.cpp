@@ -310,12 +310,11 @@ std::pair<Fields, Fields> split(const Fields& fields) {
     return parts;
 }
 
-std::unique_ptr<VirtualCalibrations> make(const Machine& machine, const Plan& plan, const HeadLike& heads,
-                                          const UncertainInputs& inputs,
-                                          const std::optional<HeadLike>& calibration_heads, const std::string& method,
-                                          const IntegerLike& seed, const std::vector<DerivedOutput>& derived,
-                                          const std::optional<SimulationOptions>& simulation,
-                                          const std::optional<AdjustmentOptions>& adjustment, const Fields& fields) {
+std::unique_ptr<VirtualCalibrations> make_virtual_calibrations(
+    const Machine& machine, const Plan& plan, const HeadLike& heads, const UncertainInputs& inputs,
+    const std::optional<HeadLike>& calibration_heads, const std::string& method, const IntegerLike& seed,
+    const std::vector<DerivedOutput>& derived, const std::optional<SimulationOptions>& simulation,
+    const std::optional<AdjustmentOptions>& adjustment, const Fields& fields) {
     const auto [of_simulation, of_adjustment] = split(fields);
     const Heads actual = to_heads(heads, plan);
     SimulationOptions simulated = options_of(simulation, of_simulation);
@@ -339,8 +338,9 @@ static void bind_virtual_calibration(py::module_& m) {
         m, "VirtualCalibrations",
         "Whole virtual calibrations: a run with drawn inputs and reading noise, traced by replay and evaluated with "
         "the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.")
-        .def(py::init(&make), py::arg("machine"), py::arg("plan"), py::arg("heads"), py::arg("inputs"), py::kw_only(),
-             py::arg("calibration_heads") = std::nullopt, py::arg("method") = "enhanced", py::arg("seed") = integer(0),
+        .def(py::init(&make_virtual_calibrations), py::arg("machine"), py::arg("plan"), py::arg("heads"),
+             py::arg("inputs"), py::kw_only(), py::arg("calibration_heads") = std::nullopt,
+             py::arg("method") = "enhanced", py::arg("seed") = integer(0),
              py::arg("derived") = std::vector<DerivedOutput>{}, py::arg("simulation") = std::nullopt,
              py::arg("adjustment") = std::nullopt,
              "simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. "
