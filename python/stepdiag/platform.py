@@ -123,8 +123,17 @@ if sys.platform == "win32":
         """The processes that this one has started, and theirs.
 
         Windows gives the number of a process that has ended to another one, whose children are not ours: psutil knows
-        that a child is younger than its parent."""
-        return [child.pid for child in reversed(psutil.Process().children(recursive=True))]
+        that a child is younger than its parent. What shows the console is a child of the first program in it, which
+        would be ended with it."""
+
+        def shows_console(child: psutil.Process) -> bool:
+            with suppress(psutil.Error, OSError, IndexError):
+                program = PureWindowsPath(child.cmdline()[0]).name
+                return program.lower() in ("conhost.exe", "openconsole.exe")
+            return False
+
+        children = psutil.Process().children(recursive=True)
+        return [child.pid for child in reversed(children) if not shows_console(child)]
 
     def _forget(child: int) -> None:
         pass
