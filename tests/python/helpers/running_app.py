@@ -12,7 +12,7 @@ from pathlib import Path
 # That of Windows, under Wine: cross/test_windows.
 WINDOWS = shlex.split(os.environ.get("STEPDIAG_PROGRAM", ""))
 PROGRAM = WINDOWS or [sys.executable, "-m", "stepdiag"]
-PATIENCE = 20_000 * (6 if WINDOWS else 1)  # ms, for what starts a command; Wine starts Python in ten seconds
+PATIENCE = 30_000 * (4 if WINDOWS else 1)  # ms, for what starts a command; Wine starts Python in ten seconds
 
 
 class Running:
