@@ -11,7 +11,7 @@ import pandas
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'judge', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_measurement', 'read_signals', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_wrong_arguments_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownByLines', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'LineInformation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'judge', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_measurement', 'read_signals', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_wrong_arguments_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -2740,6 +2740,41 @@ class Adjustment:
     def weighted_square_sum(self) -> float:
         """
         Of residuals and priors.
+        """
+class KnownByLines:
+    """
+    What the adjustment of a run of some lines would know.
+    """
+    @property
+    def determined(self) -> list[str]:
+        """
+        Parameters that are determined as a whole.
+        """
+    @property
+    def largest(self) -> dict[str, float]:
+        """
+        parameter -> largest standard uncertainty of its values, mm or rad.
+        """
+    @property
+    def volume(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (grid^3,) variances of the functional point's error, summed over X, Y and Z, mm^2, at commanded positions, Z changing fastest; NaN where something that acts there is not determined.
+        """
+class LineInformation:
+    """
+    What each line of a run tells of a machine, for comparing thousands of choices of lines with the same settings: known_by() of some of them gives the uncertainties of adjust() in a small part of its time.
+    """
+    def __init__(self, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike, options: AdjustmentOptions, *, grid: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Of a run without noise, in which lines visit every node that any line visits. grid: positions of each axis in the grid of KnownByLines. Raises InvalidArgument.
+        """
+    def add(self, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], options: AdjustmentOptions) -> None:
+        """
+        Lines of another run of as many steps, but for those that there are already. Raises InvalidArgument.
+        """
+    def known_by(self, lines: collections.abc.Sequence[str], scale_lines: collections.abc.Sequence[str]) -> KnownByLines:
+        """
+        Raises InvalidArgument for a line that no run has.
         """
 class FitQuality:
     """

@@ -14,10 +14,6 @@ namespace {
 // steps, which with it still shrink by a factor of 1e4 or so, and for uncertainties, to 1e-6 of them.
 constexpr double steps_hold = 1e-7, uncertainties_hold = 3e-10;
 
-// Rank is decided on the normal equations at zero, columns scaled to 1: a pivot at or below this counts as 0. It is the
-// square of a singular value: directions known 3e5 times worse than the best ones still count as determined.
-constexpr double rank_threshold = 1e-11;
-
 // One unknown for each dimension that the readings leave open: those that the factor of the normal equations at zero
 // has held because they depend on the others. (The band has places without an unknown, which are held too.)
 std::vector<int> dependent_unknowns(const AdjustmentProblem& problem, const BorderedFactor& factor) {

@@ -10,6 +10,10 @@
 
 namespace stepdiag {
 
+// Rank is decided on the normal equations at zero, columns scaled to 1: a pivot at or below this counts as 0. It is the
+// square of a singular value: directions known 3e5 times worse than the best ones still count as determined.
+inline constexpr double rank_threshold = 1e-11;
+
 class GaussNewton {
 public:
     // `smoothness`: deviations of second differences by function, 0 for none.

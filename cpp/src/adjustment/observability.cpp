@@ -12,13 +12,6 @@ namespace {
 // well above rounding (1e-16 times the square of the condition), well below the least share of a slope, 1/steps.
 constexpr double touching = 1e-5;
 
-// The unit of each unknown in which all columns of the problem have length 1.
-Eigen::VectorXd column_units(const GaussNewton& solver) {
-    Eigen::VectorXd units = solver.scale();
-    for (double& unit : units) unit = unit > 0.0 ? 1.0 / unit : 1.0;
-    return units;
-}
-
 bool touches(const Eigen::VectorXd& vector, const LinearForm& form, const Eigen::VectorXd& units, double largest) {
     double possible = 0.0;
     for (int i = 0; i < form.size; ++i) possible += std::abs(form.coefficient[i]) * units[form.unknown[i]];
@@ -32,6 +25,19 @@ std::pair<std::string, int> setup_unknown(int column) {
 }
 
 }  // namespace
+
+Eigen::VectorXd units_of_columns(const Eigen::VectorXd& lengths) {
+    return lengths.unaryExpr([](double length) { return length > 0.0 ? 1.0 / length : 1.0; });
+}
+
+void mark_touched(const Eigen::VectorXd& null_vector, const Eigen::VectorXd& units,
+                  const std::vector<LinearForm*>& forms, std::vector<bool>& determined) {
+    const double largest = null_vector.cwiseQuotient(units).cwiseAbs().maxCoeff();
+    for (int j = 0; j < null_vector.size(); ++j)
+        if (std::abs(null_vector[j]) > touching * largest * units[j]) determined[j] = false;
+    for (LinearForm* form : forms)
+        if (form->determined && touches(null_vector, *form, units, largest)) form->determined = false;
+}
 
 Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables)
     : problem_(solver.equations().problem()), tables_(tables), determined_(problem_.size(), true) {
@@ -56,16 +62,12 @@ Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables
         }
     for (OpenCombination& difference : differences) forms.push_back(&difference.form);
 
-    const Eigen::VectorXd units = column_units(solver);
+    const Eigen::VectorXd units = units_of_columns(solver.scale());
     const std::vector<int>& held = solver.dependent();
     Eigen::MatrixXd slopes(sloped.size(), held.size());
     for (std::size_t h = 0; h < held.size(); ++h) {
         const Eigen::VectorXd vector = solver.null_vector(held[h]);
-        const double largest = vector.cwiseQuotient(units).cwiseAbs().maxCoeff();
-        for (int j = 0; j < vector.size(); ++j)
-            if (std::abs(vector[j]) > touching * largest * units[j]) determined_[j] = false;
-        for (LinearForm* form : forms)
-            if (form->determined && touches(vector, *form, units, largest)) form->determined = false;
+        mark_touched(vector, units, forms, determined_);
         for (std::size_t i = 0; i < sloped.size(); ++i)
             slopes(i, h) = tables.slope(sloped[i])->value(vector) / problem_.plan().volume()[index(sloped[i].axis)];
     }

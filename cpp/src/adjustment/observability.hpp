@@ -15,6 +15,12 @@ struct OpenCombination {
     KnownCombination combination = {};
 };
 
+// By unknown: the unit in which its column of the weighted problem, of this length, has length 1.
+Eigen::VectorXd units_of_columns(const Eigen::VectorXd& lengths);
+// Unknowns and forms that a null vector changes are not determined.
+void mark_touched(const Eigen::VectorXd& null_vector, const Eigen::VectorXd& units,
+                  const std::vector<LinearForm*>& forms, std::vector<bool>& determined);
+
 class Observability {
 public:
     // Marks the tables' forms.

@@ -4,6 +4,7 @@
 
 #include "options.hpp"
 #include "stepdiag/adjustment/fit_quality.hpp"
+#include "stepdiag/adjustment/line_information.hpp"
 #include "stepdiag/evaluation/thresholds.hpp"
 #include "struct_table.hpp"
 
@@ -538,6 +539,67 @@ std::optional<FitQuality> fit_quality_of_run(const Measurement& measurement, con
     return fit_quality(measurement, plan, kinematics, offset, heads, options, most_steps);
 }
 
+std::string parameter_name(int i) {
+    return i < function_count ? FunctionId::at(i).name() : name(Squareness(i - function_count));
+}
+
+void bind_line_information(py::module_& m) {
+    bind_record(m, "KnownByLines", "What the adjustment of a run of some lines would know.",
+                field("volume", &KnownByLines::volume,
+                      "(grid^3,) variances of the functional point's error, summed over X, Y and Z, mm^2, at commanded "
+                      "positions, Z changing fastest; NaN where something that acts there is not determined."))
+        .def_property_readonly(
+            "largest",
+            [](const KnownByLines& known) {
+                std::map<std::string, double> largest;
+                for (int i = 0; i < KnownByLines::parameters; ++i)
+                    if (!std::isnan(known.largest[i])) largest[parameter_name(i)] = known.largest[i];
+                return largest;
+            },
+            "parameter -> largest standard uncertainty of its values, mm or rad.")
+        .def_property_readonly(
+            "determined",
+            [](const KnownByLines& known) {
+                std::vector<std::string> names;
+                for (int i = 0; i < KnownByLines::parameters; ++i)
+                    if (known.whole[i]) names.push_back(parameter_name(i));
+                return names;
+            },
+            "Parameters that are determined as a whole.");
+    py::class_<LineInformation>(
+        m, "LineInformation",
+        "What each line of a run tells of a machine, for comparing thousands of choices of lines with the same "
+        "settings: known_by() of some of them gives the uncertainties of adjust() in a small part of its time.")
+        .def(py::init([](const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
+                         const ArrayLike& tool, const AdjustmentOptions& options, int grid) {
+                 return LineInformation(measurement, plan, to_chain(chain), to_vector3(tool, "tool"),
+                                        to_heads(head, plan).calibration(), options, grid);
+             }),
+             py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"), py::arg("tool"),
+             py::arg("options"), py::kw_only(), py::arg("grid"),
+             "Of a run without noise, in which lines visit every node that any line visits. grid: positions of each "
+             "axis "
+             "in the grid of KnownByLines. Raises InvalidArgument.")
+        .def(
+            "add",
+            [](LineInformation& lines, const Measurement& measurement, const Plan& plan, const HeadLike& head,
+               const AdjustmentOptions& options) {
+                lines.add(measurement, plan, to_heads(head, plan).calibration(), options);
+            },
+            py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("options"),
+            "Lines of another run of as many steps, but for those that there are already. Raises InvalidArgument.")
+        .def(
+            "known_by",
+            [](const LineInformation& lines, const std::vector<std::string>& chosen,
+               const std::vector<std::string>& scale_lines) {
+                std::vector<ChosenLine> all;
+                for (const std::string& line : chosen) all.push_back({line, false});
+                for (const std::string& line : scale_lines) all.push_back({line, true});
+                return lines.known_by(all);
+            },
+            py::arg("lines"), py::arg("scale_lines"), "Raises InvalidArgument for a line that no run has.");
+}
+
 }  // namespace
 
 void bind_adjustment(py::module_& m) {
@@ -548,6 +610,7 @@ void bind_adjustment(py::module_& m) {
     bind_verdict(m);
     bind_fault_control(m);
     bind_adjustment_of_run(m);
+    bind_line_information(m);
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "

@@ -12,7 +12,8 @@
 3. In step 2 a plan is estimated from the exact covariances of 5 and of 10 steps (of more where the mirror is too small
    for so long ones), without repeats. The variance of a value is a constant plus a sum over steps (a random walk), and
    so it is taken as linear in their number, at every point of the volume and for every kind of parameter, and beyond 10
-   steps as not falling. At 50 steps this is within a tenth or so.
+   steps as not falling. At 50 steps this is within a tenth or so. Where lines have nothing in common but the machine,
+   the covariance of a set of lines is that of the sum of what each of them tells (planning/estimates.py).
 4. What step 2 ends with is evaluated with exact covariances: by adjustment, or by propagation where more than the noise
    of the readings is uncertain. So is the scenario's own plan.
 5. The best of these are exchanged again, line by line, now by exact covariances; only sets are evaluated that the
@@ -32,6 +33,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
+from stepdiag.planning.estimates import Estimates
 from stepdiag.planning.measuring_time import OnLine, in_turn, on_lines, times_of
 from stepdiag.planning.plan_by_time import (
     Aim,
@@ -40,7 +42,6 @@ from stepdiag.planning.plan_by_time import (
     Outcome,
     choose,
     complete,
-    evaluate,
     normal,
     outcome,
     own_candidate,
@@ -96,9 +97,13 @@ class _Search:
         self.faults = aim.family == "faults"
         self.lines = _with_others(self.own.lines, _LINES)
         self.scales = _with_others(self.own.scale_lines, _SCALES)
-        self.screened: dict[Candidate, Evaluated] = {}
+        self.estimates = Estimates(scenario, self.lines, self.scales, faults=self.faults)
         self.exact: dict[Candidate, Outcome] = {}
         self.on_lines: dict[Candidate, dict[tuple[str, bool], OnLine]] = {}
+        self.taken: dict[Candidate, tuple[float, float]] = {}
+        self.estimated: dict[Candidate, Outcome] = {}
+        # Whether more counts than the volume, which is not known where a parameter is not.
+        self.by_kind = aim.family != "volume" or any(goal.of != "volume" for goal in aim.goals)
         self.few = self._screened_steps()
 
     def run(self, report: Progress) -> list[Outcome]:
@@ -123,9 +128,9 @@ class _Search:
                     ends[best] = None
                     at = [*starts, (best.lines, best.scale_lines)]
             report(done, parts)
-        most = max((len(self.estimated(candidate).determined) for candidate in ends), default=0)
+        most = max((len(self.estimate(candidate).determined) for candidate in ends), default=0)
         for candidate in ends:
-            if len(self.estimated(candidate).determined) == most:
+            if len(self.estimate(candidate).determined) == most:
                 self.evaluated(candidate)
         report(parts - 1, parts)
         self._refine()
@@ -209,6 +214,11 @@ class _Search:
         return self._time(candidate)[0]
 
     def _time(self, candidate: Candidate) -> tuple[float, float]:
+        if candidate not in self.taken:
+            self.taken[candidate] = self._in_turn(candidate)
+        return self.taken[candidate]
+
+    def _in_turn(self, candidate: Candidate) -> tuple[float, float]:
         setting = replace(candidate, lines=(), scale_lines=())
         of_lines = self.on_lines.setdefault(setting, {})
         chosen = [(line, False) for line in candidate.lines] + [(line, True) for line in candidate.scale_lines]
@@ -228,10 +238,7 @@ class _Search:
         return self.exact[candidate]
 
     def _screen(self, candidate: Candidate) -> Evaluated:
-        if candidate not in self.screened:
-            between = self._time(candidate)[1]
-            self.screened[candidate] = evaluate(self.scenario, candidate, between, faults=self.faults)
-        return self.screened[candidate]
+        return self.estimates.of(candidate, lambda one: self._time(one)[1])
 
     def _screened_steps(self) -> tuple[int, int]:
         for few in SCREENED:
@@ -243,8 +250,13 @@ class _Search:
         returns = math.ceil(steps * candidate.check_points / candidate.steps)
         return replace(candidate, steps=steps, repeats=repeats, check_points=returns)
 
-    def estimated(self, candidate: Candidate) -> Outcome:
+    def estimate(self, candidate: Candidate) -> Outcome:
         """Without its mirror."""
+        if candidate not in self.estimated:
+            self.estimated[candidate] = self._estimate(candidate)
+        return self.estimated[candidate]
+
+    def _estimate(self, candidate: Candidate) -> Outcome:
         few, more = self.few
         seconds = self.seconds(candidate)
         spacing = float(max(self.known.plan.volume)) / candidate.steps
@@ -252,7 +264,10 @@ class _Search:
         # Two runs distinguish faults that one does not.
         repeats = min(candidate.repeats, 2 if self.faults else 1)
         steps = self.few if candidate.steps >= few else (candidate.steps, candidate.steps)
-        at = [self._screen(self._standing_for(candidate, n, repeats)) for n in steps]
+        first = self._screen(self._standing_for(candidate, steps[0], repeats))
+        if not self.by_kind and math.isinf(first.volume):
+            return replace(nothing, determined=first.determined, trouble=first.trouble)
+        at = [first, self._screen(self._standing_for(candidate, steps[1], repeats))]
         if at[1].variances is None or at[0].variances is None:
             return replace(nothing, trouble=at[1].trouble or at[0].trouble)
         share = (candidate.steps - more) / (more - few)
@@ -280,7 +295,7 @@ class _Search:
             seconds = self.seconds(candidate)
             if seconds > aim.minutes * MINUTE:  # however good it is
                 return (math.inf, seconds)
-            found = self.estimated(like)
+            found = self.estimate(like)
             smaller = replace(
                 found,
                 seconds=seconds,
@@ -296,7 +311,7 @@ class _Search:
         return (self._lacking(found), *self.aim.order(replace(found, seconds=self.seconds(candidate))))
 
     def _by_time(self, candidate: Candidate, like: Candidate) -> Rank:
-        return (self._lacking(self.estimated(like)), self.seconds(candidate))
+        return (self._lacking(self.estimate(like)), self.seconds(candidate))
 
     def _lacking(self, one: Outcome) -> float:
         """How many parameters it does not determine that another plan does; of fewer no plan is better."""
@@ -310,7 +325,7 @@ class _Search:
             if self.faults or whole is None:
                 return unknown
             rank = order(candidate, whole)
-            if rank[0] < math.inf and self.estimated(whole).trouble:  # such as a mirror too small
+            if rank[0] < math.inf and self.estimate(whole).trouble:  # such as a mirror too small
                 return unknown
             return rank
 

@@ -39,6 +39,7 @@ ScalePoints = Literal["ends", "steps"]
 # Of two plans whose uncertainties differ by less than this share, the faster one is shown.
 ALIKE: Final = 0.05
 MOST_CANDIDATES: Final = 2000
+GRID: Final = 5  # positions of each axis at which the volume is looked at
 # Largest errors of machines, by the limit, that `decide` finds to be within it and not within it.
 WITHIN: Final = 0.8
 
@@ -337,26 +338,26 @@ def root_of_largest(variances: npt.NDArray[np.float64]) -> float:
 def evaluate(scenario: Scenario, candidate: Candidate, between: float, *, faults: bool = False) -> Evaluated:
     """Of a plan with so many seconds from a reading to the next one."""
     try:
-        usual = _usual(scenario, candidate, between)
+        planned = usual(scenario, candidate, between)
         more = says_more(scenario.known)
         controls = None
         if faults or not more:
-            run = simulate_scenario(usual)
+            run = simulate_scenario(planned)
             adjusted = adjusted_numbers(
-                usual.known, run, full_covariance=not more, reliability=faults, search_faults=False
+                planned.known, run, full_covariance=not more, reliability=faults, search_faults=False
             )
             calibration = adjusted.calibration
             controls = adjusted.reliability if faults else None
         if more:
-            calibration = _propagated(usual)
+            calibration = _propagated(planned)
         largest = {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
-        determined = frozenset(extents(calibration, usual.known.plan)[0])
-        return Evaluated(largest, determined, variances_in_volume(calibration), controls)
+        determined = frozenset(extents(calibration, planned.known.plan)[0])
+        return Evaluated(largest, determined, variances_in_volume(calibration, GRID), controls)
     except InvalidArgument as error:
         return Evaluated({}, trouble=str(error))
 
 
-def _usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario:
+def usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario:
     """A plan's run of a usual machine, with so many seconds from a reading to the next one."""
     changes = {
         "lines": candidate.lines,
@@ -383,12 +384,12 @@ def says_more(known: Known) -> bool:
     return bool(known.uncertain.inputs) or any(noise.quantity != "channel" for noise in known.uncertain.noise)
 
 
-def _propagated(usual: Scenario) -> _core.Calibration:
+def _propagated(planned: Scenario) -> _core.Calibration:
     """By all that [uncertainty] names: drifts and walks take the longer, the longer measuring takes."""
     from stepdiag.uncertainty.virtual_calibrations import virtual_calibrations
 
-    model = virtual_calibrations(usual, method="adjustment")
-    with located(str(usual.path)):
+    model = virtual_calibrations(planned, method="adjustment")
+    with located(str(planned.path)):
         covariance = _core.propagate(model, covariance=True).covariance
     assert covariance is not None
     return _core.with_covariance(model.calibration, covariance)

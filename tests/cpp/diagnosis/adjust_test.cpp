@@ -7,7 +7,9 @@
 #include <cmath>
 #include <random>
 
+#include "stepdiag/adjustment/line_information.hpp"
 #include "stepdiag/simulation/simulate.hpp"
+#include "stepdiag/uncertainty/volume_errors.hpp"
 #include "support/refuses.hpp"
 #include "support/usual.hpp"
 
@@ -310,6 +312,96 @@ TEST(Adjustment, BeamsWithLasersFromTheirPriorsAndSeveralRunsConvergeFromZero) {
         // One sound run in a million has more.
         EXPECT_GT(found.chi_square_probability, 1e-6) << seed;
     }
+}
+
+// What lines tell one by one, against the adjustment of a run of just these lines.
+void expect_same_knowledge(const Workshop& all, const std::vector<Line>& lines, const std::vector<Line>& scale_lines) {
+    const auto run_of = [&](const std::vector<Line>& own, const std::vector<Line>& own_scales) {
+        Workshop some = all;
+        some.lines = own;
+        some.scale_lines = own_scales;
+        stepdiag::SimulationOptions as_set_up;
+        for (const auto& [line, set_up] : all.simulation().misalignment)
+            if (some.plan().contains(Line::parse(line))) as_set_up.misalignment[line] = set_up;
+        return std::pair(some, simulate(some.machine(), some.plan(), some.head, as_set_up));
+    };
+    constexpr int grid = 3;
+    const auto [measured, run] = run_of(all.lines, {});
+    stepdiag::LineInformation information(run, measured.plan(), measured.machine().chain(), all.tool,
+                                          all.head.calibration(), {}, grid);
+    const auto [scales, scale_run] = run_of({all.lines.front()}, all.scale_lines);
+    information.add(scale_run, scales.plan(), all.head.calibration(), {});
+    std::vector<stepdiag::ChosenLine> chosen;
+    for (const Line& line : lines) chosen.push_back({line.name(), false});
+    for (const Line& line : scale_lines) chosen.push_back({line.name(), true});
+    const stepdiag::KnownByLines known = information.known_by(chosen);
+
+    const auto [some, some_run] = run_of(lines, scale_lines);
+    AdjustmentOptions options;
+    options.full_covariance = true;
+    const stepdiag::Calibration calibration = some.adjust(some_run, options).calibration;
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        const auto& function = calibration.functions[i];
+        const bool whole = function && function->slope_determined && int(function->position.size()) == all.steps + 1;
+        EXPECT_EQ(known.whole[i], whole) << FunctionId::at(i).name();
+        ASSERT_EQ(std::isnan(known.largest[i]), !function.has_value()) << FunctionId::at(i).name();
+        if (!function) continue;
+        const double u =
+            *std::max_element(function->standard_uncertainty.begin(), function->standard_uncertainty.end());
+        EXPECT_NEAR(known.largest[i], u, 0.02 * u) << FunctionId::at(i).name();
+    }
+    stepdiag::PointRows points(grid * grid * grid, 3);
+    for (int i = 0; i < points.rows(); ++i)
+        points.row(i) = all.volume.cwiseProduct(Vector3d(i / 9, i / 3 % 3, i % 3)) / (grid - 1);
+    const auto u = error_uncertainties_at(calibration, all.tool, points);
+    for (int i = 1; i < points.rows(); ++i) {  // home has no error
+        const double variance = u.row(i).head<3>().squaredNorm();
+        EXPECT_TRUE(std::isnan(variance) || !std::isnan(known.volume[i])) << points.row(i);
+        if (std::isnan(variance)) continue;  // also where nothing that is open acts, as next to home
+        EXPECT_NEAR(known.volume[i], variance, 0.02 * variance) << points.row(i);
+    }
+}
+
+Workshop with_all_lines() {
+    Workshop all;
+    all.steps = 4;
+    for (const char* name : {"pp0", "np0", "p0p", "n0p", "0pp", "0np", "p00"}) all.lines.push_back(Line::parse(name));
+    return all;
+}
+
+TEST(LineInformation, OfAllLinesIsWhatTheAdjustmentKnows) {
+    const Workshop all = with_all_lines();
+    std::vector<Line> lines = all.lines;
+    lines.pop_back();  // a plan measures an axis once
+    expect_same_knowledge(all, lines, all.scale_lines);
+}
+
+TEST(LineInformation, OfFourDiagonalsAndTwoScaleLines) {
+    expect_same_knowledge(with_all_lines(), stepdiag::test::diagonals, {Line::parse("p00"), Line::parse("00p")});
+}
+
+TEST(LineInformation, OfTooFewLinesLeavesOpenWhatTheAdjustmentDoes) {
+    expect_same_knowledge(with_all_lines(), {Line::parse("ppp"), Line::parse("p0p")}, {Line::parse("p00")});
+    expect_same_knowledge(with_all_lines(), {Line::parse("pp0"), Line::parse("p00")}, {});
+}
+
+TEST(LineInformation, RefusesWhatItCannotTell) {
+    const Workshop all;
+    stepdiag::LineInformation information(all.run(), all.plan(), all.machine().chain(), all.tool,
+                                          all.head.calibration(), {}, 2);
+    expect_refused([&] { information.known_by({{"pp0", false}}); }, "no run has the line \"pp0\"");
+    Workshop finer = all;
+    finer.steps = 10;
+    expect_refused([&] { information.add(finer.run(), finer.plan(), all.head.calibration(), {}); },
+                   "expected 8 steps, got 10");
+    AdjustmentOptions smooth;
+    smooth.smoothness = stepdiag::Smoothness{1.0, 1.0};
+    expect_refused(
+        [&] {
+            stepdiag::LineInformation(all.run(), all.plan(), all.machine().chain(), all.tool, all.head.calibration(),
+                                      smooth, 2);
+        },
+        "got expansion coefficients, drifts or smoothness");
 }
 
 }  // namespace

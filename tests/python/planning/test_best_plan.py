@@ -123,7 +123,7 @@ def test_estimates_of_many_steps_are_those_of_the_adjustment() -> None:
         candidate = replace(
             own_candidate(scenario.known), lines=of_plan, scale_lines=scales, steps=40, repeats=2, scale_points=points
         )
-        exact, estimate = outcome(scenario, candidate), search.estimated(candidate)
+        exact, estimate = outcome(scenario, candidate), search.estimate(candidate)
         # Linear in the steps is the random walk alone; with more steps set-ups are better known as well: found 7 %.
         assert estimate.volume == pytest.approx(exact.volume, rel=0.12)
         assert estimate.worst("squareness") == pytest.approx(exact.worst("squareness"), rel=0.25)
@@ -136,7 +136,7 @@ def test_estimates_are_of_as_many_steps_as_the_mirror_allows() -> None:
     )
     search = best_plan._Search(scenario, Aim(), None)
     assert search.few == (25, 50)  # ten steps of 80 mm need a mirror of 90 mm
-    assert search.estimated(replace(search.own, steps=50)).volume < 1.0
+    assert search.estimate(replace(search.own, steps=50)).volume < 1.0
 
 
 @pytest.mark.usefixtures("few_lines")

@@ -1,0 +1,72 @@
+"""What plans with few steps give, for thousands of choices of lines: from what each line tells, where that is all."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.parameters import KINDS, Kind, kind_of
+from stepdiag.planning.plan_by_time import GRID, Candidate, Evaluated, evaluate, says_more, usual
+from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run, simulate_scenario
+from stepdiag.scenario.heads import of_run
+
+ANY_LINE: Final = "ppp"  # a plan has at least one that is no scale line
+
+
+class Estimates:
+    """Of the adjustment of runs of plans with some of these lines and scale lines, each found once."""
+
+    def __init__(self, scenario: Scenario, lines: Sequence[str], scales: Sequence[str], *, faults: bool) -> None:
+        self.scenario, self.lines, self.scales, self.faults = scenario, tuple(lines), tuple(scales), faults
+        # Uncertain inputs and faults take whole runs.
+        self.by_line = not faults and not says_more(scenario.known)
+        self.found: dict[Candidate, Evaluated] = {}
+        self.tells: dict[Candidate, _core.LineInformation | None] = {}
+
+    def of(self, candidate: Candidate, between: Callable[[Candidate], float]) -> Evaluated:
+        """`between`: seconds from a reading to the next one."""
+        if candidate not in self.found:
+            tells = self._tells(candidate, between) if self.by_line else None
+            if tells is None:
+                self.found[candidate] = evaluate(self.scenario, candidate, between(candidate), faults=self.faults)
+            else:
+                self.found[candidate] = _evaluated(tells.known_by(candidate.lines, candidate.scale_lines))
+        return self.found[candidate]
+
+    def _tells(self, candidate: Candidate, between: Callable[[Candidate], float]) -> _core.LineInformation | None:
+        """Each line's information with the settings of a candidate; None where lines have more in common than the
+        machine, or no run of all of them can be made."""
+        setting = replace(candidate, lines=self.lines, scale_lines=())
+        key = replace(setting, scale_lines=self.scales)
+        if key not in self.tells:
+            try:
+                self.tells[key] = self._run_of_each(setting, replace(key, lines=(ANY_LINE,)), between(candidate))
+            except InvalidArgument:
+                self.tells[key] = None
+        return self.tells[key]
+
+    def _run_of_each(self, of_lines: Candidate, of_scales: Candidate, between: float) -> _core.LineInformation:
+        tells: _core.LineInformation | None = None
+        for candidate in (of_lines, of_scales):
+            scenario = usual(self.scenario, candidate, between)
+            known = scenario.known
+            run = reduced_run(known, simulate_scenario(scenario))
+            options = adjustment_options(known, run)
+            if tells is None:
+                tells = _core.LineInformation(
+                    run, known.plan, of_run(known.heads), known.chain, known.tool, options, grid=GRID
+                )
+            else:
+                tells.add(run, known.plan, of_run(known.heads), options)
+        assert tells is not None
+        return tells
+
+
+def _evaluated(known: _core.KnownByLines) -> Evaluated:
+    largest: dict[Kind, float] = {}
+    for parameter, u in known.largest.items():
+        kind = kind_of(parameter)
+        largest[kind] = max(largest.get(kind, 0.0), u)
+    ordered = {kind: largest[kind] for kind in KINDS if kind in largest}
+    return Evaluated(ordered, frozenset(known.determined), known.volume)
