@@ -104,7 +104,7 @@ if sys.platform == "win32":
 
     def interrupt(process: int) -> None:
         """As Ctrl-C does, a process of an OWN_GROUP and those that it has started."""
-        with suppress(OSError):
+        with suppress(OSError, SystemError):  # the second where Python has ended it, for want of a console
             os.kill(process, signal.CTRL_BREAK_EVENT)
 
     def is_running(process: int) -> bool:

@@ -118,7 +118,7 @@ def test_path_of_a_person(person: Person, files: Path, tmp_path: Path) -> None:
     person.click("link", "VMC 1200")
     expect(page.locator("#calibrations tbody tr")).to_have_count(2)
     expect(page.locator("svg.curve").first).to_be_visible()
-    assert re.search(r"\d+,\d µm", page.locator("#calibrations tbody").inner_text()), "decimal comma of the person"
+    expect(page.locator("#calibrations tbody")).to_contain_text(re.compile(r"\d+,\d µm"))  # as the person writes it
     person.click("link", "Trend")
     person.heading("Largest error in the volume")
     assert person.clicks <= 25

@@ -84,6 +84,17 @@ static void bind_volume_summary(py::module_& m) {
         py::arg("calibration"), py::arg("points"), py::kw_only(), py::arg("tool") = std::nullopt,
         "Standard uncertainties of errors_at from the covariance of a calibration, (n, 6), mm and rad; NaN where a "
         "parameter is missing. Raises InvalidArgument without a covariance.");
+    m.def(
+        "error_changes_at",
+        [](const Calibration& calibration, const ArrayLike& points, const ArrayLike& changes) {
+            const PointRows rows = to_points(points, "points");
+            return to_numpy(error_changes_at(calibration, calibration.tool, rows, to_matrix(changes, "changes")));
+        },
+        py::arg("calibration"), py::arg("points"), py::arg("changes"),
+        "How errors_at change with the values of a calibration, to first order, (6 n, k), mm and rad, six rows a "
+        "point: "
+        "for changes (entries, k) of all its entries in the order of the covariance; NaN where a parameter is missing. "
+        "Raises InvalidArgument.");
 }
 
 static void bind_volume_draws(py::module_& m) {

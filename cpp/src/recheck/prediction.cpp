@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/block_product.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -23,8 +24,22 @@ Eigen::MatrixXd without_columns(const Eigen::MatrixXd& matrix, Eigen::Index begi
     return rest;
 }
 
+// sum += a^T a, the lower triangle.
+void add_square(const Eigen::MatrixXd& a, Eigen::MatrixXd& sum) {
+    constexpr Eigen::Index panel = 48, whole = 24;  // columns, in whole sixes and vectors
+    const Eigen::Index size = (a.cols() + whole - 1) / whole * whole;
+    Eigen::MatrixXd transposed = Eigen::MatrixXd::Zero(size, a.rows());
+    transposed.topRows(a.cols()) = a.transpose();
+    Eigen::MatrixXd negative = Eigen::MatrixXd::Zero(size, size);
+    for (Eigen::Index j = 0; j < size; j += panel)
+        subtract_product(size - j, std::min(panel, size - j), a.rows(), MatrixView{&transposed(j, 0), size},
+                         {&transposed(j, 0), 1, size}, {&negative(j, j), size});
+    sum.triangularView<Eigen::Lower>() -= negative.topLeftCorner(a.cols(), a.cols());
+}
+
 constexpr int most_steps = 100;
-constexpr double settled = 1e-8;  // decrease of the square sum, by reading or, where it is larger, by itself
+constexpr double settled = 1e-8;   // decrease of the square sum, by reading or, where it is larger, by itself
+constexpr double unmoved = 1e-12;  // decrease, by which a step is below a millionth of any standard uncertainty
 
 // A whole step, or a part of it that makes the square sum smaller: angles that act at second order only, as those of a
 // single axis do, have no step that is right. Returns the sum; with a share of 0 that of `before`.
@@ -275,7 +290,7 @@ bool Prediction::factorize(bool curved, double damping) {
         is_positive = is_positive && rows.factor.isPositive();
         rows.transfer = rows.factor.solve(coupling);
         rows.gradient = rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
-        matrix_.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
+        add_square(rows.by_baseline, matrix_);
         matrix_.triangularView<Eigen::Lower>() -= coupling.transpose() * rows.transfer;
         gradient_ += rows.by_baseline.transpose() * rows.residual - rows.transfer.transpose() * rows.gradient;
     }
@@ -315,6 +330,8 @@ double Prediction::step() {
     linearise(true);
     const bool is_definite = factorize();
     const double decrement = this->decrement();
+    is_factor_here_ = is_definite && decrement < unmoved;
+    if (is_factor_here_) return decrement;
     if (is_definite && moves(good * decrement)) {
         damping_ = 0.0;
         return decrement;
@@ -333,8 +350,10 @@ void Prediction::solve() {
     linearise(false);
     for (int i = 0; i < most_steps; ++i)
         if (step() < settled * std::max(double(used_), chi_square())) break;
-    linearise(true);
-    factorize();
+    if (!is_factor_here_) {
+        linearise(true);
+        factorize();
+    }
     for (SetupRows& rows : setups_) {
         rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
         linearise(rows, Eigen::VectorXd::Zero(z_.size()), false);
@@ -376,6 +395,10 @@ double Prediction::chi_square() const {
 
 Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) const {
     const Eigen::Index size = matrix_.rows(), after = size - begin - count;
+    if (after == 0) {  // they are the last ones of the factor, too
+        const Eigen::MatrixXd last = factor_.matrixL().toDenseMatrix().bottomRightCorner(count, count);
+        return last * last.transpose() - Eigen::MatrixXd::Identity(count, count);
+    }
     // Everything else: the columns before and after.
     Eigen::MatrixXd others(size - count, size - count), coupling(size - count, count);
     others << matrix_.topLeftCorner(begin, begin), matrix_.topRightCorner(begin, after),
@@ -383,6 +406,13 @@ Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) 
     coupling << matrix_.block(0, begin, begin, count), matrix_.block(begin + count, begin, after, count);
     return matrix_.block(begin, begin, count, count) - Eigen::MatrixXd::Identity(count, count) -
            coupling.transpose() * others.llt().solve(coupling);
+}
+
+Eigen::MatrixXd Prediction::covariance_columns(Eigen::Index begin, Eigen::Index count) const {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(matrix_.rows(), count);
+    columns.middleRows(begin, count).setIdentity();
+    factor_.solveInPlace(columns);
+    return columns;
 }
 
 ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {

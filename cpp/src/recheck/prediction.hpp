@@ -56,6 +56,8 @@ public:
     // them.
     const Eigen::VectorXd& values() const { return z_; }
     const Eigen::MatrixXd& information() const { return matrix_; }
+    // Columns of its inverse.
+    Eigen::MatrixXd covariance_columns(Eigen::Index begin, Eigen::Index count) const;
     // What the readings tell of some components by their priors, everything else being estimated with them.
     Eigen::MatrixXd information(Eigen::Index begin, Eigen::Index count) const;
 
@@ -100,6 +102,7 @@ private:
     std::vector<SetupRows> setups_;
     Eigen::VectorXd z_;
     double damping_ = 0.0;
+    bool is_factor_here_ = false;  // and the derivatives
     Eigen::MatrixXd matrix_;
     Eigen::VectorXd gradient_;                      // half of the square sum's derivative by z, downwards
     Eigen::LLT<Eigen::MatrixXd> factor_;            // of matrix_

@@ -39,8 +39,7 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     const Eigen::MatrixXd& root = baseline.root();
     const Eigen::Index columns = root.cols();
     const Eigen::VectorXd change = root * prediction.values().head(columns);
-    const Eigen::MatrixXd inverse =
-        prediction.information().llt().solve(Eigen::MatrixXd::Identity(prediction.values().size(), columns));
+    const Eigen::MatrixXd inverse = prediction.covariance_columns(0, columns);
     const Eigen::MatrixXd covariance = baseline.rest_covariance() + root * inverse.topRows(columns) * root.transpose();
     Calibration updated = baseline.calibration();
     updated.method += (updated.date.empty() ? "" : " of " + updated.date) + ", rechecked";
@@ -62,7 +61,7 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     return updated;
 }
 
-Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
+Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& changing, bool update) {
     const auto count = Eigen::Index(changing.changes().size());
     const Eigen::Index begin = changing.root().cols() - count;
 
@@ -70,7 +69,17 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
     changed.solve();
     const Told told = told_of_changes(changed, begin, count);
 
-    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, {}, with_change(changing, changed)};
+    Recheck result{0.0,
+                   0,
+                   1.0,
+                   0.0,
+                   0,
+                   1.0,
+                   changing.changes(),
+                   {},
+                   {},
+                   {},
+                   update ? with_change(changing, changed) : changing.calibration()};
     result.chi_square = told.estimate.cwiseAbs2().dot(told.information);
     result.degrees_of_freedom = int(count - told.first);
     if (result.degrees_of_freedom > 0)
@@ -79,11 +88,10 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
     result.fit_chi_square = fit.square_sum;
     result.fit_degrees_of_freedom = fit.freedom;
     if (fit.freedom > 0) result.fit_probability = chi_square_probability(fit.square_sum, fit.freedom);
-    const Eigen::MatrixXd inverse =
-        changed.information().llt().solve(Eigen::MatrixXd::Identity(changed.values().size(), changed.values().size()));
     Eigen::VectorXd prior(count);
     for (Eigen::Index j = 0; j < count; ++j) prior[j] = changing.changes()[std::size_t(j)].prior;
-    result.covariance = prior.asDiagonal() * inverse.block(begin, begin, count, count) * prior.asDiagonal();
+    result.covariance =
+        prior.asDiagonal() * changed.covariance_columns(begin, count).middleRows(begin, count) * prior.asDiagonal();
     result.shape = changing.root().rightCols(count) * prior.cwiseInverse().asDiagonal();
     const Eigen::MatrixXd strong = told.direction.rightCols(count - told.first);
     for (Eigen::Index j = 0; j < count; ++j) {
@@ -139,13 +147,14 @@ std::string name(ChangeKind kind) {
 
 Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options,
-                const ChangePriors& priors) {
+                const ChangePriors& priors, bool update) {
     check_same_machine(baseline, plan, chain, tool, options);
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     const Baseline changing(baseline, priors, read_positions(problem));
-    return judge_without_wrong_readings({measurement, plan, chain, tool, heads, options}, problem,
-                                        [&](const AdjustmentProblem& rest) { return rechecked(rest, changing); });
+    return judge_without_wrong_readings(
+        {measurement, plan, chain, tool, heads, options}, problem,
+        [&](const AdjustmentProblem& rest) { return rechecked(rest, changing, update); });
 }
 
 }  // namespace stepdiag

@@ -273,27 +273,28 @@ SixRows errors_at(const Machine& machine, const PointRows& points) {
     return errors;
 }
 
-SixRows error_uncertainties_at(const Calibration& calibration, const Vector3d& tool, const PointRows& points) {
+namespace {
+
+// at(point, component, entries): what a deviation is the sum of, by the values of a calibration; none where a parameter
+// is missing.
+template <class At>
+void for_deviations(const Calibration& calibration, const Vector3d& tool, const PointRows& points, const At& at) {
     if (!points.allFinite()) throw InvalidArgument("points: expected finite positions in mm");
-    if (calibration.covariance.size() == 0)
-        throw InvalidArgument("calibration: expected one evaluated with full covariance");
     const EntryLayout layout(calibration);
-    const Eigen::MatrixXd& covariance = calibration.covariance;
     // Where no lever is 0. What is missing nowhere need not be looked for at every point.
     const auto somewhere = deviations_at(calibration.chain, tool, {0.37, 0.61, 0.83});
     std::array<bool, 6> complete;
     for (std::size_t c = 0; c < 6; ++c) complete[c] = layout.missing(somewhere[c]).empty();
-    SixRows uncertainties(points.rows(), 6);
     in_blocks(points.rows(), 256, [&](Index begin, Index end) {
         std::vector<EntryLayout::Weighted> entries;
         for (Index i = begin; i < end; ++i) {
             const auto deviations = deviations_at(calibration.chain, tool, points.row(i).transpose());
             for (std::size_t c = 0; c < 6; ++c) {
+                entries.clear();
                 if (!complete[c] && !layout.missing(deviations[c]).empty()) {
-                    uncertainties(i, Index(c)) = std::numeric_limits<double>::quiet_NaN();
+                    at(i, Index(c), nullptr);
                     continue;
                 }
-                entries.clear();
                 for (const Term& term : deviations[c]) {
                     if (!layout.has(term.parameter)) continue;
                     if (term.parameter >= function_count)
@@ -302,18 +303,50 @@ SixRows error_uncertainties_at(const Calibration& calibration, const Vector3d& t
                         for (const auto& [entry, weight] : layout.interpolation(term.parameter, term.position))
                             entries.push_back({entry, weight * term.coefficient});
                 }
-                double variance = 0.0;
-                for (std::size_t a = 0; a < entries.size(); ++a) {
-                    const double* column = covariance.col(entries[a].entry).data();
-                    double sum = 0.5 * entries[a].weight * column[entries[a].entry];
-                    for (std::size_t b = 0; b < a; ++b) sum += entries[b].weight * column[entries[b].entry];
-                    variance += 2.0 * entries[a].weight * sum;
-                }
-                uncertainties(i, Index(c)) = std::sqrt(std::max(variance, 0.0));
+                at(i, Index(c), &entries);
             }
         }
     });
+}
+
+}  // namespace
+
+SixRows error_uncertainties_at(const Calibration& calibration, const Vector3d& tool, const PointRows& points) {
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument("calibration: expected one evaluated with full covariance");
+    const Eigen::MatrixXd& covariance = calibration.covariance;
+    SixRows uncertainties(points.rows(), 6);
+    for_deviations(calibration, tool, points, [&](Index i, Index c, const std::vector<EntryLayout::Weighted>* entries) {
+        if (!entries) {
+            uncertainties(i, c) = std::numeric_limits<double>::quiet_NaN();
+            return;
+        }
+        double variance = 0.0;
+        for (std::size_t a = 0; a < entries->size(); ++a) {
+            const auto& [entry, weight] = (*entries)[a];
+            const double* column = covariance.col(entry).data();
+            double sum = 0.5 * weight * column[entry];
+            for (std::size_t b = 0; b < a; ++b) sum += (*entries)[b].weight * column[(*entries)[b].entry];
+            variance += 2.0 * weight * sum;
+        }
+        uncertainties(i, c) = std::sqrt(std::max(variance, 0.0));
+    });
     return uncertainties;
+}
+
+Eigen::MatrixXd error_changes_at(const Calibration& calibration, const Vector3d& tool, const PointRows& points,
+                                 const Eigen::MatrixXd& changes) {
+    if (const Index size = EntryLayout(calibration).size(); changes.rows() != size)
+        throw InvalidArgument("changes: expected those of " + std::to_string(size) + " entries, got " +
+                              std::to_string(changes.rows()));
+    Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(6 * points.rows(), changes.cols());
+    for_deviations(calibration, tool, points, [&](Index i, Index c, const std::vector<EntryLayout::Weighted>* entries) {
+        auto row = moved.row(6 * i + c);
+        if (!entries) row.setConstant(std::numeric_limits<double>::quiet_NaN());
+        else
+            for (const auto& [entry, weight] : *entries) row += weight * changes.row(entry);
+    });
+    return moved;
 }
 
 }  // namespace stepdiag

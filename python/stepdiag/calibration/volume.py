@@ -39,6 +39,7 @@ SQUARENESS_OF: Final[Mapping[str, tuple[str, ...]]] = {"X": (), "Y": ("C0Y",), "
 TWO_SIDED: Final = NormalDist().inv_cdf(0.975)
 ONE_SIDED: Final = NormalDist().inv_cdf(0.95)
 FEWEST_SAMPLES: Final = 1000
+GRID: Final = 5  # positions of each axis, where a figure of the whole volume has to be quick
 DRAWS_BETWEEN: Final = 1000  # of what lies between the nodes; its 95 % quantile is good to a tenth of its uncertainty
 MOST_NODES: Final = 201  # of an axis that are computed; 8 million points in a tenth of a second
 MOST_DRAWN: Final = 51  # positions an axis; more take much longer and change little
@@ -355,7 +356,7 @@ def errors_at(
     )
 
 
-def variances_in_volume(calibration: Calibration, count: int = 5) -> FloatArray:
+def variances_in_volume(calibration: Calibration, count: int = GRID) -> FloatArray:
     """Variance of the functional point's error, summed over X, Y and Z, mm^2, at the points of a grid with so many
     positions an axis, (count^3,); NaN where a parameter is not determined. Of a calibration with covariance."""
     points = errors_at(calibration, volume_grid(np.stack([np.zeros(3), calibration.volume]), count))

@@ -6,8 +6,9 @@ from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.volume import GRID
 from stepdiag.parameters import KINDS, Kind, kind_of
-from stepdiag.planning.plan_by_time import GRID, Candidate, Evaluated, evaluate, says_more, usual
+from stepdiag.planning.plan_by_time import Candidate, Evaluated, evaluate, says_more, usual
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run, simulate_scenario
 from stepdiag.scenario.heads import of_run
 

@@ -39,7 +39,6 @@ ScalePoints = Literal["ends", "steps"]
 # Of two plans whose uncertainties differ by less than this share, the faster one is shown.
 ALIKE: Final = 0.05
 MOST_CANDIDATES: Final = 2000
-GRID: Final = 5  # positions of each axis at which the volume is looked at
 # Largest errors of machines, by the limit, that `decide` finds to be within it and not within it.
 WITHIN: Final = 0.8
 
@@ -352,7 +351,7 @@ def evaluate(scenario: Scenario, candidate: Candidate, between: float, *, faults
             calibration = _propagated(planned)
         largest = {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
         determined = frozenset(extents(calibration, planned.known.plan)[0])
-        return Evaluated(largest, determined, variances_in_volume(calibration, GRID), controls)
+        return Evaluated(largest, determined, variances_in_volume(calibration), controls)
     except InvalidArgument as error:
         return Evaluated({}, trouble=str(error))
 

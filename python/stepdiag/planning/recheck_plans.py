@@ -8,14 +8,16 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from stepdiag._core import Calibration, ChangeTerm, InvalidArgument, Plan
+from stepdiag.calibration.volume import variances_in_volume
 from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import not_measured
 from stepdiag.planning.plan_by_time import ALIKE, Candidate
-from stepdiag.rechecking.recheck import Judged, farthest_move, recheck
+from stepdiag.rechecking.recheck import hidden_by, moves_by, recheck
 from stepdiag.rechecking.verification import ALPHA
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.known import runs_of
@@ -89,7 +91,7 @@ def own_limit(baseline: Calibration) -> float:
     """The expanded uncertainty (k = 2) of the calibration where it is largest in the volume, mm: a smaller change
     hardly matters."""
     assert baseline.covariance is not None
-    return 2.0 * farthest_move(baseline, baseline.covariance)
+    return 2.0 * float(np.sqrt(variances_in_volume(baseline).max()))
 
 
 def candidates(scenario: Scenario, baseline: Calibration, minutes: float) -> list[tuple[float, Candidate]]:
@@ -156,10 +158,9 @@ def powers(
     """Of all candidates, the fastest first. `progress` receives how many of how many are done."""
     everything = candidates(scenario, baseline, minutes)
     result: list[Power] = []
-    gains: tuple[float, ...] | None = None
+    moves: npt.NDArray[np.float64] | None = None
     for done, (seconds, candidate) in enumerate(everything, 1):
-        one = power_of(scenario, baseline, candidate, seconds, alpha=alpha, gains=gains)
-        gains = one.gains or gains
+        one, moves = power_of(scenario, baseline, candidate, seconds, alpha=alpha, moves=moves)
         result.append(one)
         if progress is not None:
             progress(done, len(everything))
@@ -175,10 +176,10 @@ def power_of(
     seconds: float,
     *,
     alpha: float = ALPHA,
-    gains: tuple[float, ...] | None = None,
-) -> Power:
-    """By readings without noise of a machine as the baseline has it. `gains`: those of another plan, which are the
-    same."""
+    moves: npt.NDArray[np.float64] | None = None,
+) -> tuple[Power, npt.NDArray[np.float64] | None]:
+    """By readings without noise of a machine as the baseline has it. `moves`: as `moves_by`, which are the same for all
+    plans; they are given back."""
     planned = not_measured(
         scenario.known,
         {
@@ -191,14 +192,16 @@ def power_of(
     )
     try:
         run = simulate_scenario(Scenario(planned, truth_of(TruthKeys(), {}, planned)), baseline.to_error_map())
-        found = recheck(baseline, planned, run)
+        found = recheck(baseline, planned, run, update=False)
     except InvalidArgument as error:
-        return Power(candidate, seconds, trouble=str(error))
+        return Power(candidate, seconds, trouble=str(error)), moves
     smallest = found.smallest_changes_seen(alpha=alpha, power=POWER)
-    if gains is None:
-        gains = tuple(farthest_move(baseline, np.outer(shape, shape)) for shape in found.shape.T)
-    hidden = Judged(found, baseline, alpha).hidden
-    return Power(candidate, seconds, found.terms, tuple(map(float, smallest)), gains, hidden)
+    if moves is None:
+        moves = moves_by(baseline, found.shape)
+    gains = tuple(np.sqrt((moves**2).sum(axis=1).max(axis=0)).tolist())
+    return Power(
+        candidate, seconds, found.terms, tuple(map(float, smallest)), gains, hidden_by(moves, found.covariance)
+    ), moves
 
 
 def choose(found: Sequence[Power], minutes: float, limit: float) -> Power | None:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag._core import Calibration, Measurement, Recheck
-from stepdiag.calibration.volume import variances_in_volume
+from stepdiag.calibration.volume import GRID, volume_grid
 from stepdiag.rechecking.verification import with_stated_between_nodes
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
@@ -31,7 +31,9 @@ CHANGE_UNITS: Final = {
 
 
 @checked
-def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Recheck:
+def recheck(
+    baseline: Calibration, scenario: Scenario | Known, measurement: Measurement, *, update: bool = True
+) -> Recheck:
     """Test whether a machine has changed since its calibration, and estimate the change.
 
     The machine is the baseline plus a change with low-order terms (`[change]` of the scenario). Both
@@ -41,6 +43,7 @@ def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Meas
         baseline: the calibration, with covariance and all 21 parameters (`evaluate -o FILE.nc`).
         scenario: plan, head, uncertainties, `[temperature]` and `[change]` of the readings.
         measurement: readings of a short run. The baseline must not be made from them.
+        update: otherwise `updated` is the baseline as it was, which takes less time.
 
     Raises:
         InvalidArgument: the baseline cannot predict these readings, or they do not fit the plan.
@@ -55,6 +58,7 @@ def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Meas
         known.tool,
         adjustment_options(known),
         known.change,
+        update,
     )
 
 
@@ -102,11 +106,19 @@ class Judged:
     def hidden(self) -> float:
         """What a change that the readings do not determine may move the tool by, mm: twice the standard
         deviation of the functional point at the worst point of the volume, with the priors."""
-        shape = self.recheck.shape
-        return 2.0 * farthest_move(self.baseline, shape @ self.recheck.covariance @ shape.T)
+        return hidden_by(moves_by(self.baseline, self.recheck.shape), self.recheck.covariance)
 
 
-def farthest_move(baseline: Calibration, covariance: FloatArray) -> float:
-    """Standard deviation of the functional point where it is largest in the volume, mm, by a covariance (n, n) of the
-    calibration's entries."""
-    return float(np.sqrt(variances_in_volume(_core.with_covariance(baseline, covariance)).max()))
+def moves_by(baseline: Calibration, shape: FloatArray) -> FloatArray:
+    """How the functional point moves at a grid in the volume by changes of the calibration's entries (entries, k):
+    (points, 3, k), mm."""
+    points = volume_grid([np.zeros(3), baseline.volume], GRID)
+    moves = _core.error_changes_at(baseline, points, shape)
+    return moves.reshape(len(points), 6, -1)[:, :3]
+
+
+def hidden_by(moves: FloatArray, covariance: FloatArray) -> float:
+    """Twice the standard deviation of the functional point where it is largest, mm, by a covariance (k, k) of the
+    changes."""
+    variances = ((moves @ covariance) * moves).sum(axis=(1, 2))
+    return 2.0 * float(np.sqrt(variances.max()))

@@ -43,5 +43,10 @@ SixRows errors_at(const Machine& machine, const PointRows& points);
 // Standard uncertainties of the same, (n, 6), from the covariance of a calibration; linear in its values. Throws
 // InvalidArgument for a calibration without covariance. What a missing parameter acts in is NaN.
 SixRows error_uncertainties_at(const Calibration& calibration, const Eigen::Vector3d& tool, const PointRows& points);
+// How the same change with the values of a calibration, to first order: (6 n, k), mm and rad, six rows a point, for
+// changes of all its entries (entries, k) in the order of the covariance. What a missing parameter acts in is NaN.
+// Throws InvalidArgument for another number of entries.
+Eigen::MatrixXd error_changes_at(const Calibration& calibration, const Eigen::Vector3d& tool, const PointRows& points,
+                                 const Eigen::MatrixXd& changes);
 
 }  // namespace stepdiag
