@@ -14,6 +14,8 @@ from pathlib import Path
 import pefile
 
 SHIM = Path(__file__).with_name("wine_shim.c")
+# Wine 8 has no CopyFile2, which shutil of Python 3.12 and later takes where there is one.
+AT_START = "import _winapi\n\nif hasattr(_winapi, 'CopyFile2'):\n    del _winapi.CopyFile2\n"
 INSTEAD = "stepdiag-crt-{}-for-wine.dll"  # as long as the name of Microsoft's: it is written over that
 OF_C = re.compile(r"api-ms-win-crt-(math|runtime)-l1-1-0\.dll|stepdiag-crt-(math|runtime)-for-wine\.dll")
 
@@ -38,6 +40,7 @@ def main(clang: str, python: Path, packages: Path) -> None:
             command = [clang, "-shared", SHIM, definition, "-ladvapi32", "-o", python / name]
             subprocess.run(command, check=True)
 
+    (packages / "sitecustomize.py").write_text(AT_START)
     (runtime,) = python.glob("python3?*.dll")
     exported = [one.name.decode() for one in pefile.PE(str(runtime)).DIRECTORY_ENTRY_EXPORT.symbols if one.name]
     library("python3.dll", [f"{name}={runtime.stem}.{name}" for name in exported])
