@@ -282,7 +282,12 @@ void NormalEquations::add_curvature(const Eigen::VectorXd& x, BorderedBand& matr
                               setup::lateral,   setup::lateral + 1,   setup::roll,  setup::gain};
     const std::vector<double> derivatives = derivatives_;
     const Eigen::VectorXd residuals = residuals_;
+    const auto is_unknown = [&](int c) {
+        return std::any_of(problem_->setups().begin(), problem_->setups().end(),
+                           [&](const LineSetup& setup) { return setup.unknown[c] != no_unknown; });
+    };
     for (const int c : curved) {
+        if (!is_unknown(c)) continue;
         Eigen::VectorXd shifted = x;  // of all set-ups at once: none has readings of another
         for (const LineSetup& setup : problem_->setups())
             if (const int j = setup.unknown[c]; j != no_unknown) shifted[j] += difference / problem_->change_scale()[j];
