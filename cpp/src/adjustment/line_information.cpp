@@ -62,10 +62,11 @@ AdjustmentProblem problem_of(const Measurement& run, const Plan& plan, const Cha
     AdjustmentProblem problem(run, plan, chain, tool, heads, options);
     if (problem.readings().empty())
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
-    if (!problem.coefficients().empty() || options.smoothness)
+    if (!problem.coefficients().empty() || options.smoothness || options.distance_scale_uncertainty > 0.0 ||
+        options.air_index_uncertainty > 0.0)
         throw InvalidArgument(
             "lines: expected nothing but the machine that they have in common, got expansion "
-            "coefficients, drifts or smoothness");
+            "coefficients, drifts, smoothness, or an uncertain scale of distances");
     return problem;
 }
 

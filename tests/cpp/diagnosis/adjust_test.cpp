@@ -401,7 +401,7 @@ TEST(LineInformation, RefusesWhatItCannotTell) {
             stepdiag::LineInformation(all.run(), all.plan(), all.machine().chain(), all.tool, all.head.calibration(),
                                       smooth, 2);
         },
-        "got expansion coefficients, drifts or smoothness");
+        "got expansion coefficients, drifts, smoothness");
 }
 
 }  // namespace

@@ -33,14 +33,16 @@ struct KnownByLines {
 };
 
 // The normal equations of each line without the unknowns of its set-up, which no other line has. Those of some lines
-// are sums of theirs, so that a choice of lines takes one factor and its inverse: a tenth of the time of an adjustment,
-// with the same uncertainties but for what rounds.
+// are sums of theirs, so that a choice of lines takes one factor and its inverse: a tenth of the time of an adjustment.
+// What is determined is the same, uncertainties are within a hundredth or so: a set-up is taken to be where is usual
+// for it, and the machine where all lines together say.
 class LineInformation {
 public:
     // A run without noise, in which lines visit every node that any line visits: as the adjustment would evaluate it
     // with these options. `grid`: positions of each axis in the grid of KnownByLines, at least 2. Throws
     // InvalidArgument for what lines have in common besides the machine (expansion coefficients and drifts that are
-    // unknowns, smoothness), and where no machine explains the readings.
+    // unknowns, smoothness, an uncertain scale of distances or index of the air), and where no machine explains the
+    // readings.
     LineInformation(const Measurement& run, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                     const HeadCalibrations& heads, const AdjustmentOptions& options, int grid);
     // Lines of another run with the same steps, but for those that there are already.
