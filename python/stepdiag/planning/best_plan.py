@@ -283,9 +283,9 @@ class _Search:
         low, high = (np.array([found.largest[kind] for kind in kinds]) ** 2 for found in at)
         return replace(
             nothing,
-            largest=dict(zip(kinds, np.sqrt(of_steps(low, high)).tolist(), strict=True)),
+            largest=dict(zip(kinds, map(_as_good, np.sqrt(of_steps(low, high)).tolist()), strict=True)),
             determined=at[1].determined,
-            volume=root_of_largest(of_steps(at[0].variances, at[1].variances)),
+            volume=_as_good(root_of_largest(of_steps(at[0].variances, at[1].variances))),
             faults=at[1].faults,
         )
 
@@ -334,6 +334,11 @@ class _Search:
     def _of_estimate(self) -> Bound:
         order = self._by_estimates(self.aim, SLACK)
         return lambda candidate, whole: order(candidate, candidate)
+
+
+def _as_good(estimate: float) -> float:
+    """To four digits: what is estimated from two numbers of steps is no better, and rounding must not choose."""
+    return float(f"{estimate:.4g}")
 
 
 def _with_others(own: Sequence[str], usual: Sequence[str]) -> tuple[str, ...]:

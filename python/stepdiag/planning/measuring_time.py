@@ -77,13 +77,14 @@ def on_lines(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = Fal
 def in_turn(lines: Iterable[OnLine], times: Times) -> tuple[float, float]:
     """Seconds from home to the last reading of lines that are measured one after another, and the mean time from a
     reading to the next one on a line."""
-    measured = list(lines)
-    places = np.array([np.zeros(3), *(line.last for line in measured)])
-    ways = np.array([line.first for line in measured]) - places[:-1]
-    moving = float(times.move(np.sqrt((ways * ways).sum(axis=1))).sum())
-    total = moving + sum(line.set_up + line.seconds for line in measured)
-    measuring = sum(line.seconds - line.reading for line in measured)
-    return total, measuring / sum(line.readings - 1 for line in measured)
+    total, place = 0.0, np.zeros(3)
+    measuring, gaps = 0.0, 0
+    for line in lines:
+        total += line.set_up + float(times.move(np.linalg.norm(line.first - place))) + line.seconds
+        measuring += line.seconds - line.reading
+        gaps += line.readings - 1
+        place = line.last
+    return total, measuring / gaps
 
 
 def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> tuple[float, float]:
