@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "adjustment/adjustment_result.hpp"
-#include "adjustment/smoothness.hpp"
 #include "adjustment/solution.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -23,7 +22,7 @@ using Eigen::VectorXd;
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 // Below this part of what a line tells of an unknown, what its set-up leaves of it is rounding.
 constexpr double left_by_set_up = 1e-9;
-// Below this, the functional point does not move by an error: mm by 1 mm, or by 1 mrad.
+// Below this, the functional point does not move by an error: mm by 1 mm, or by 1 rad.
 constexpr double moves = 1e-9;
 
 // A line's normal equations for the machine, and their diagonal before the set-up was eliminated.
@@ -54,8 +53,6 @@ struct GridPoint {
     std::array<int, 3> place;
     Eigen::Matrix<double, 3, 18> by_errors;
 };
-
-using LineKey = std::pair<std::string, bool>;
 
 AdjustmentProblem problem_of(const Measurement& run, const Plan& plan, const Chain& chain, const Vector3d& tool,
                              const HeadCalibrations& heads, const AdjustmentOptions& options) {
@@ -127,9 +124,9 @@ void add_line(const NormalEquations& equations, int number, const std::vector<in
 struct LineInformation::State {
     AdjustmentProblem problem;  // of the first run, whose unknowns count
     AdjustmentTables tables;
-    Index size;                 // the machine's unknowns are the first ones
-    std::vector<int> unknowns;  // of these places, those that are an unknown
-    std::map<LineKey, LineEquations> lines;
+    Index size;                                                   // the machine's unknowns are the first ones
+    std::vector<int> unknowns;                                    // of these places, those that are an unknown
+    std::map<std::pair<std::string, bool>, LineEquations> lines;  // by name, and whether it is a scale line
     std::vector<AxisPlace> places;
     std::vector<GridPoint> points;
 
@@ -164,14 +161,14 @@ void LineInformation::State::add(const AdjustmentProblem& run) {
     if (!solution.solve_from_zero())
         throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
     NormalEquations equations(run);
-    std::map<LineKey, LineEquations> added;
+    decltype(lines) added;
     for (const bool zero : {true, false}) {
         equations.linearise(zero ? VectorXd::Zero(run.size()) : solution.x());
         if (zero) equations.drop_roundings();
         for (int number = 0; number < int(run.setups().size()); ++number) {
             const LineSetup& setup = run.setups()[number];
             LineEquations& line = added
-                                      .try_emplace(LineKey(setup.line.name(), setup.is_scale_line),
+                                      .try_emplace(std::pair(setup.line.name(), setup.is_scale_line),
                                                    LineEquations{Equations(size), Equations(size)})
                                       .first->second;
             add_line(equations, number, common, !zero, zero ? line.at_zero : line.at_machine);

@@ -569,7 +569,8 @@ void bind_line_information(py::module_& m) {
     py::class_<LineInformation>(
         m, "LineInformation",
         "What each line of a run tells of a machine, for comparing thousands of choices of lines with the same "
-        "settings: known_by() of some of them gives the uncertainties of adjust() in a small part of its time.")
+        "settings: known_by() of some of them gives the uncertainties of adjust() within a hundredth or so, in a "
+        "small part of its time.")
         .def(py::init([](const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
                          const ArrayLike& tool, const AdjustmentOptions& options, int grid) {
                  return LineInformation(measurement, plan, to_chain(chain), to_vector3(tool, "tool"),

@@ -12,8 +12,9 @@
 3. In step 2 a plan is estimated from the exact covariances of 5 and of 10 steps (of more where the mirror is too small
    for so long ones), without repeats. The variance of a value is a constant plus a sum over steps (a random walk), and
    so it is taken as linear in their number, at every point of the volume and for every kind of parameter, and beyond 10
-   steps as not falling. At 50 steps this is within a tenth or so. Where lines have nothing in common but the machine,
-   the covariance of a set of lines is that of the sum of what each of them tells (planning/estimates.py).
+   steps as not falling. At 50 steps this is within a tenth or so; four digits of it count. Where lines have nothing in
+   common but the machine, the covariance of a set of lines is that of the sum of what each of them tells
+   (planning/estimates.py).
 4. What step 2 ends with is evaluated with exact covariances: by adjustment, or by propagation where more than the noise
    of the readings is uncertain. So is the scenario's own plan.
 5. The best of these are exchanged again, line by line, now by exact covariances; only sets are evaluated that the

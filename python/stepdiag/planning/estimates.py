@@ -11,6 +11,7 @@ from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.planning.plan_by_time import Candidate, Evaluated, evaluate, says_more, usual
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run, simulate_scenario
 from stepdiag.scenario.heads import of_run
+from stepdiag.scenario.known import Known
 
 ANY_LINE: Final = "ppp"  # a plan has at least one that is no scale line
 
@@ -48,20 +49,18 @@ class Estimates:
         return self.tells[key]
 
     def _run_of_each(self, of_lines: Candidate, of_scales: Candidate, between: float) -> _core.LineInformation:
-        tells: _core.LineInformation | None = None
-        for candidate in (of_lines, of_scales):
-            scenario = usual(self.scenario, candidate, between)
-            known = scenario.known
-            run = reduced_run(known, simulate_scenario(scenario))
-            options = adjustment_options(known, run)
-            if tells is None:
-                tells = _core.LineInformation(
-                    run, known.plan, of_run(known.heads), known.chain, known.tool, options, grid=GRID
-                )
-            else:
-                tells.add(run, known.plan, of_run(known.heads), options)
-        assert tells is not None
+        known, run, options = self._planned(of_lines, between)
+        tells = _core.LineInformation(run, known.plan, of_run(known.heads), known.chain, known.tool, options, grid=GRID)
+        known, run, options = self._planned(of_scales, between)
+        tells.add(run, known.plan, of_run(known.heads), options)
         return tells
+
+    def _planned(
+        self, candidate: Candidate, between: float
+    ) -> tuple[Known, _core.Measurement, _core.AdjustmentOptions]:
+        scenario = usual(self.scenario, candidate, between)
+        run = reduced_run(scenario.known, simulate_scenario(scenario))
+        return scenario.known, run, adjustment_options(scenario.known, run)
 
 
 def _evaluated(known: _core.KnownByLines) -> Evaluated:
