@@ -245,8 +245,9 @@ void NormalEquations::gather(const AdjustedPoint& point, const BorderedBand& inv
                 covariance(i, j) = element(inverse, all.unknown[i], all.unknown[j]);
 }
 
-Eigen::VectorXd NormalEquations::reading_variances(const BorderedBand& inverse) const {
-    Eigen::VectorXd variances(residuals_.size()), image;
+template <class Function>
+void NormalEquations::for_each_covariance(const BorderedBand& inverse, const Function& function) const {
+    Eigen::VectorXd image;
     Square covariance;
     for (const AdjustedPoint& point : problem_->points()) {
         gather(point, inverse, covariance);
@@ -254,10 +255,27 @@ Eigen::VectorXd NormalEquations::reading_variances(const BorderedBand& inverse) 
             const Row row = this->row(point, r);
             const Eigen::Map<const Eigen::VectorXd> derivative(row.derivative, row.size);
             image.noalias() = covariance * derivative;
-            variances[r] = derivative.dot(image);
+            function(r, row, image);
         }
     }
+}
+
+Eigen::VectorXd NormalEquations::reading_variances(const BorderedBand& inverse) const {
+    Eigen::VectorXd variances(residuals_.size());
+    for_each_covariance(inverse, [&](int r, const Row& row, const Eigen::VectorXd& covariance) {
+        variances[r] = Eigen::Map<const Eigen::VectorXd>(row.derivative, row.size).dot(covariance);
+    });
     return variances;
+}
+
+Eigen::VectorXd NormalEquations::prior_shares(const BorderedBand& inverse) const {
+    Eigen::VectorXd shares = Eigen::VectorXd::Zero(residuals_.size());
+    for_each_covariance(inverse, [&](int r, const Row& row, const Eigen::VectorXd& covariance) {
+        for (int i = 0; i < row.size; ++i)
+            if (const int j = row.unknown[i]; j != no_unknown)
+                shares[r] += prior_weight_[j] * covariance[i] * covariance[i];
+    });
+    return shares;
 }
 
 BorderedBand NormalEquations::matrix() const {

@@ -96,8 +96,17 @@ public:
     void gather(const AdjustedPoint& point, const BorderedBand& inverse, Square& covariance) const;
     // Of what the model says of each reading, used or not, in units of the reading's own.
     Eigen::VectorXd reading_variances(const BorderedBand& inverse) const;
+    // The part of each reading's redundancy that it owes to what values with priors may scatter. The residuals are
+    // (1 - H) w; were those values all where their priors say, the mean square of such a residual would be that of
+    // noise alone, the diagonal of (1 - H)^2 and not of 1 - H: less by the sum of (N^-1 a)^2/u^2, a the reading's
+    // derivative and N the normal equations, over all priors. Taken are those of unknowns that the reading depends on.
+    // Others reach it through the machine alone; of three runs that is a tenth of a degree of freedom a line.
+    Eigen::VectorXd prior_shares(const BorderedBand& inverse) const;
 
 private:
+    // function(reading, row, what its unknowns and its model have in common)
+    template <class Function>
+    void for_each_covariance(const BorderedBand& inverse, const Function& function) const;
     Eigen::VectorXd transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const;
     void assemble_point(const AdjustedPoint& point, int number, BorderedBand& matrix) const;
 

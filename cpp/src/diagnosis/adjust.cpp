@@ -74,6 +74,13 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
                             drift_estimates(without.problem(), without.x(), without.inverse()));
 }
 
+std::vector<ReadingResidual> residuals_by_row(const NormalEquations& equations, const Eigen::VectorXd& variances) {
+    std::vector<ReadingResidual> residuals = reading_residuals(equations, variances);
+    std::stable_sort(residuals.begin(), residuals.end(),
+                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
+    return residuals;
+}
+
 // The calibration at these values of the unknowns, were nothing left out or freed.
 Calibration without_treatment(const Solution& treated, const AdjustmentProblem& plain,
                               const AdjustmentOptions& options) {
@@ -141,18 +148,20 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.expansion = expansion_estimates(problem, x, inverse);
     result.machine_drift = drift_estimates(problem, x, inverse);
     result.rounded = problem.rounded();
-    result.residuals = reading_residuals(solver.equations(), solution->reading_variances());
-    std::stable_sort(result.residuals.begin(), result.residuals.end(),
-                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
+    result.residuals = residuals_by_row(solver.equations(), solution->reading_variances());
+    const ResidualsByNoise by_noise = [&] {
+        return residuals_by_row(solver.equations(),
+                                solution->reading_variances() + solver.equations().prior_shares(inverse));
+    };
     for (const ScatterOfChannel& each : found.scatter) result.variance_components.push_back(each.component);
     result.combinations = known_combinations(observability, x, inverse);
     result.weighted_square_sum = solver.equations().square_sum(x);
     result.degrees_of_freedom = solution->degrees_of_freedom();
     if (result.degrees_of_freedom > 0)
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
-    const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
-    result.verdict =
-        judge(result, patterns, prior_scatter(problem, x, solver.factor()), residual_rounding(solver.equations()));
+    const auto patterns = residual_patterns(result, by_noise, measurement, solver.equations(), solver.factor());
+    result.verdict = judge(result, patterns, prior_scatter(problem, x, solver.factor()),
+                           less_noise(result.residuals, by_noise), residual_rounding(solver.equations()));
     if (!result.faults.empty())
         take_costs(costs_of_faults(result.calibration, without_treatment(*solution, *found.problem, options)),
                    result.verdict);

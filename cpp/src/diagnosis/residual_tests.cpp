@@ -8,6 +8,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "diagnosis/fault_tests.hpp"
+#include "evaluation/fit_test.hpp"
 #include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {
@@ -17,20 +18,28 @@ constexpr double fewest_freedom = 1.0;  // on either side of a comparison
 
 struct Share {
     double square_sum = 0.0;
-    double freedom = 0.0;  // sum of redundancies
+    double freedom = 0.0;           // sum of redundancies
+    double freedom_by_noise = 0.0;  // of those by noise alone
 
     void add(const Share& other) {
         square_sum += other.square_sum;
         freedom += other.freedom;
+        freedom_by_noise += other.freedom_by_noise;
     }
+    Share rest_of(const Share& all) const {
+        return {all.square_sum - square_sum, all.freedom - freedom, all.freedom_by_noise - freedom_by_noise};
+    }
+    double mean_square() const { return square_sum / freedom; }
 };
 
-// Probability that F of these degrees of freedom lies as far from 1 as this one, on its side, or on the other.
-double two_sided_probability(double f, double freedom, double freedom_of_others) {
-    const double x = freedom * f / (freedom * f + freedom_of_others);
-    const double below = Eigen::numext::betainc(0.5 * freedom, 0.5 * freedom_of_others, x);
-    const double above = Eigen::numext::betainc(0.5 * freedom_of_others, 0.5 * freedom, 1.0 - x);
-    return 2.0 * std::min(below, above);
+// Probability that F of these degrees of freedom lies as far from 1 as this one, on its side, or on the other: that of
+// a mean square which is less than another, its freedom being that by noise alone.
+double two_sided_probability(const Share& less, const Share& more) {
+    if (!(less.freedom_by_noise > 0.0)) return 1.0;
+    const double f = less.square_sum / less.freedom_by_noise / more.mean_square();
+    if (f >= 1.0) return 1.0;
+    const double ratio = less.freedom_by_noise * f / more.freedom;
+    return 2.0 * Eigen::numext::betainc(0.5 * less.freedom_by_noise, 0.5 * more.freedom, ratio / (1.0 + ratio));
 }
 
 // That chance makes the square of one standard normal number as large as this, the others' mean square being 1 of this
@@ -65,7 +74,9 @@ struct Group {
 };
 
 // A group and its complement make the same comparison: of the halves one is enough.
-std::map<Group, Share> shares_of_groups(const Adjustment& adjustment, const Measurement& measurement, Share& all) {
+std::map<Group, Share> shares_of_groups(const std::vector<ReadingResidual>& residuals,
+                                        const std::vector<ReadingResidual>& by_noise, const Measurement& measurement,
+                                        Share& all) {
     const std::vector<double> when = progress(measurement);
     std::map<std::string, int> lines;  // in the order of their names
     std::vector<int> line_of;          // by row
@@ -87,12 +98,13 @@ std::map<Group, Share> shares_of_groups(const Adjustment& adjustment, const Meas
     std::map<int, Share> of_run;
     for (const Station& station : measurement.stations()) of_run[station.run];
     Share second_half, far_half;
-    for (const ReadingResidual& r : adjustment.residuals) {
+    for (std::size_t k = 0; k < residuals.size(); ++k) {
+        const ReadingResidual& r = residuals[k];
         if (!r.used() || r.redundancy == 0.0) continue;
         const Station& station = measurement.stations()[r.row];
         const int line = line_of[r.row];
         const auto channel = channel_of(r.channel);
-        const Share share{r.normalised * r.normalised * r.redundancy, r.redundancy};
+        const Share share{r.normalised * r.normalised * r.redundancy, r.redundancy, by_noise[k].redundancy};
         for (Share* sum : {&all, &of_line[line], &of_channel[channel], &of_both[line][channel], &of_run[station.run]})
             sum->add(share);
         if (when[r.row] > 0.5) second_half.add(share);
@@ -114,17 +126,20 @@ std::map<Group, Share> shares_of_groups(const Adjustment& adjustment, const Meas
 std::vector<ResidualPattern> scatter_of_groups(const std::map<Group, Share>& groups, const Share& all) {
     std::vector<ResidualPattern> patterns;
     for (const auto& [group, share] : groups) {
-        const double others = all.freedom - share.freedom, rest = all.square_sum - share.square_sum;
-        if (share.freedom < fewest_freedom || others < fewest_freedom || !(rest > 0.0)) continue;
-        const double factor = share.square_sum / share.freedom;
-        FitReason reason{FitFinding::uneven_misfit, std::sqrt(factor), std::sqrt(rest / others), group.line,
-                         group.channel};
+        const Share others = share.rest_of(all);
+        if (share.freedom < fewest_freedom || others.freedom < fewest_freedom || !(others.square_sum > 0.0)) continue;
+        FitReason reason{FitFinding::uneven_misfit, std::sqrt(share.mean_square()), std::sqrt(others.mean_square()),
+                         group.line, group.channel};
         reason.run = group.run;
         reason.aspect = group.aspect;
-        patterns.push_back({reason, two_sided_probability(factor * others / rest, share.freedom, others)});
+        const bool is_less = share.mean_square() < others.mean_square();
+        patterns.push_back(
+            {reason, is_less ? two_sided_probability(share, others) : two_sided_probability(others, share)});
     }
     return patterns;
 }
+
+bool is_likelier(const ResidualPattern& a, const ResidualPattern& b) { return a.probability < b.probability; }
 
 // --- trends ---
 
@@ -251,8 +266,7 @@ double chi_square(const FitReason& trend) { return std::pow(trend.value / trend.
 void keep_the_best(std::vector<ResidualPattern>& patterns) {
     constexpr double least_share = 0.5;  // of the best one's chi-square
     if (patterns.empty()) return;
-    std::stable_sort(patterns.begin(), patterns.end(),
-                     [](const auto& a, const auto& b) { return a.probability < b.probability; });
+    std::stable_sort(patterns.begin(), patterns.end(), is_likelier);
     const double best = chi_square(patterns.front().reason), alike = patterns.front().probability;
     std::size_t kept = 1;
     while (kept < patterns.size() &&
@@ -267,17 +281,44 @@ void keep_the_best(std::vector<ResidualPattern>& patterns) {
 
 }  // namespace
 
-std::vector<ResidualPattern> residual_patterns(const Adjustment& adjustment, const Measurement& measurement,
-                                               const NormalEquations& equations, const BorderedFactor& factor) {
-    Share all;
-    const auto groups = shares_of_groups(adjustment, measurement, all);
-    std::vector<ResidualPattern> scatter = scatter_of_groups(groups, all);
+ResidualPattern less_noise(const std::vector<ReadingResidual>& residuals, const ResidualsByNoise& by_noise) {
+    const auto sum_of = [](const std::vector<ReadingResidual>& list) {
+        Share sum;
+        for (const ReadingResidual& r : list)
+            if (r.used()) sum.add({r.normalised * r.normalised * r.redundancy, r.redundancy});
+        return sum;
+    };
+    const Share all = sum_of(residuals);
+    ResidualPattern pattern{{FitFinding::no_misfit, 1.0, 1.0}, 1.0};
+    if (all.freedom < fewest_freedom) return pattern;
+    pattern.reason.value = std::sqrt(all.mean_square());
+    pattern.reason.standard_uncertainty = pattern.reason.value / std::sqrt(2.0 * all.freedom);
+    const auto probability = [&](double freedom) { return 1.0 - chi_square_probability(all.square_sum, freedom); };
+    pattern.probability = probability(all.freedom);
+    if (pattern.probability < 1.0 - thresholds.no_misfit_doubtful) {
+        const double freedom = sum_of(by_noise()).freedom;
+        pattern.probability = freedom > 0.0 ? probability(freedom) : 1.0;
+    }
+    return pattern;
+}
+
+std::vector<ResidualPattern> residual_patterns(const Adjustment& adjustment, const ResidualsByNoise& by_noise,
+                                               const Measurement& measurement, const NormalEquations& equations,
+                                               const BorderedFactor& factor) {
+    const auto of_groups = [&](const std::vector<ReadingResidual>& with) {
+        Share all;
+        const auto groups = shares_of_groups(adjustment.residuals, with, measurement, all);
+        return scatter_of_groups(groups, all);
+    };
+    std::vector<ResidualPattern> scatter = of_groups(adjustment.residuals);
     std::vector<ResidualPattern> trends = trends_of_readings(adjustment, TrendTests(measurement, equations, factor));
     const double tests = double(scatter.size() + trends.size());
+    const auto likeliest = [&] { return std::min_element(scatter.begin(), scatter.end(), is_likelier); };
+    // Redundancies by noise alone are the smaller ones: where nothing is conspicuous by all of them, nothing is by
+    // those.
+    if (!scatter.empty() && tests * likeliest()->probability < thresholds.pattern) scatter = of_groups(by_noise());
     if (scatter.size() > 1) {
-        std::iter_swap(scatter.begin(),
-                       std::min_element(scatter.begin(), scatter.end(),
-                                        [](const auto& a, const auto& b) { return a.probability < b.probability; }));
+        std::iter_swap(scatter.begin(), likeliest());
         scatter.resize(1);
     }
     keep_the_best(trends);

@@ -98,7 +98,8 @@ std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& ex
 }
 
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
-              const std::vector<ResidualPattern>& prior_scatter, double residual_rounding) {
+              const std::vector<ResidualPattern>& prior_scatter, const ResidualPattern& less_noise,
+              double residual_rounding) {
     std::vector<FitReason> reasons;
     judge_faults(adjustment, reasons);
     if (reasons.empty() && adjustment.degrees_of_freedom <= 0)
@@ -120,8 +121,7 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
     } else {
         take_patterns(patterns, thresholds.pattern_alone, reasons);
         // Where less was stated than can be weighed, less noise than is used says nothing of what was stated.
-        if (probability > thresholds.no_misfit_doubtful && adjustment.rounded.empty())
-            reasons.push_back(noise(FitFinding::no_misfit, adjustment));
+        if (adjustment.rounded.empty()) take_patterns({less_noise}, 1.0 - thresholds.no_misfit_doubtful, reasons);
     }
     take_patterns(prior_scatter, thresholds.pattern_alone, reasons);
     return {reasons.empty() ? Fit::accepted : Fit::doubtful, reasons};

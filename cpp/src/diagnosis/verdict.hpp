@@ -11,9 +11,10 @@ std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& ex
 
 // From what the adjustment found, its own verdict not counted, the patterns of its residuals, and the set-up quantities
 // that scatter more than their priors. `residual_rounding`: rms of the residuals, each in units of its rounding
-// (adjustment/channel_model.hpp).
+// (adjustment/channel_model.hpp). `less_noise`: of residual_tests.hpp.
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
-              const std::vector<ResidualPattern>& prior_scatter, double residual_rounding);
+              const std::vector<ResidualPattern>& prior_scatter, const ResidualPattern& less_noise,
+              double residual_rounding);
 
 // AdjustmentOptions::scale_uncertainty, of an adjustment with its verdict.
 void scale_uncertainties(Adjustment& adjustment);

@@ -383,4 +383,30 @@ TEST(FaultTests, OfSlipsAreWhatSolutionsSay) {
     }
 }
 
+// By the dense matrices: what the diagonals of 1 - H and (1 - H)^2 differ by, line by line.
+TEST(PriorShares, AreWhatRedundanciesOweToPriors) {
+    Workshop shop;
+    shop.repeats = 3;
+    const Solved solved(shop, shop.run());
+    const Dense dense(solved);
+    const VectorXd& weight = solved.solver.equations().prior_weight();
+    VectorXd exact = VectorXd::Zero(dense.j.rows());
+    for (int p = 0; p < solved.problem.size(); ++p)
+        if (weight[p] > 0.0)
+            exact += weight[p] * (dense.j * dense.solve(VectorXd::Unit(solved.problem.size(), p))).cwiseAbs2();
+    const VectorXd shares = solved.solver.equations().prior_shares(solved.inverse);
+    std::vector<double> of_line(solved.problem.setups().size()), exact_of_line = of_line;
+    for (const auto& point : solved.problem.points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            of_line[point.setup] += shares[r];
+            exact_of_line[point.setup] += exact[r];
+        }
+    for (std::size_t s = 0; s < of_line.size(); ++s) {
+        // The rest comes from other lines' values.
+        EXPECT_GT(of_line[s], 0.6 * exact_of_line[s]) << solved.problem.setups()[s].line.name();
+        EXPECT_LT(of_line[s], exact_of_line[s] * (1.0 + 1e-6));
+    }
+    EXPECT_GT(exact.sum(), 0.1);
+}
+
 }  // namespace

@@ -13,6 +13,8 @@ from stepdiag.findings.verdict import verdict_words
 
 STATED = {"distance": 0.1e-3, "alpha": 1e-6, "beta": 1e-6}
 MACHINE = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=7))
+MACHINE_OF_THREE = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=7, intervals=3))
+NOISE = {"distance": STATED["distance"], "tilt": STATED["alpha"]}
 PLAN = sd.Plan(VOLUME, DIAGONALS, 10, scale_lines=SCALE_LINES)
 # Everything measured twice: what a line does is not what the machine does.
 TWICE = sd.simulate(MACHINE, PLAN, sd.Head(), repeats=2, seconds_per_reading=10.0)
@@ -65,6 +67,23 @@ def test_smaller_noise_is_measured_and_said() -> None:
     (reason,) = adjust(noisy(TWICE, factor=0.7)).verdict.reasons
     assert reason.finding == "no_misfit"
     assert abs(reason.value - 0.7) < 4 * reason.standard_uncertainty
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_runs_with_one_set_up_are_accepted_and_their_noise_is_what_it_is(seed: int) -> None:
+    """The set-ups of all runs are the same, so that they scatter far less than their priors: the instrument does not."""
+    plan = sd.Plan(VOLUME, DIAGONALS, 3, scale_lines=SCALE_LINES)
+    noise = sd.Noise(STATED["distance"], STATED["alpha"], seed=seed)
+    run = sd.simulate(MACHINE_OF_THREE, plan, sd.Head(), repeats=100, noise=noise)
+    found = sd.methods.adjust(run, plan, sd.Head(), CHAIN, uncertainty=sd.methods.ReadingUncertainty(**NOISE))
+    assert found.chi_square_probability > 0.999  # priors counted
+    assert found.verdict.fit == "accepted"
+    # What is stated too large is found all the same.
+    larger = {name: 1.1 * u for name, u in NOISE.items()}
+    found = sd.methods.adjust(run, plan, sd.Head(), CHAIN, uncertainty=sd.methods.ReadingUncertainty(**larger))
+    (reason,) = found.verdict.reasons
+    assert reason.finding == "no_misfit"
+    assert abs(reason.value - 1 / 1.1) < 4 * reason.standard_uncertainty
 
 
 @pytest.mark.parametrize(
