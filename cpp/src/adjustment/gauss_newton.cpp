@@ -80,15 +80,16 @@ void GaussNewton::refresh(const Eigen::VectorXd& x) {
     else equations_.linearise(x);
 }
 
-Eigen::VectorXd GaussNewton::null_vector(int held) const {
-    Eigen::VectorXd vector = Eigen::VectorXd::Unit(scale_.size(), held);
+BorderedFactor::Sides GaussNewton::null_vectors(const std::vector<int>& held) const {
+    BorderedFactor::Sides vectors = BorderedFactor::Sides::Zero(scale_.size(), BorderedFactor::sides);
+    for (std::size_t h = 0; h < held.size(); ++h) vectors(held[h], Eigen::Index(h)) = 1.0;
     // The second round takes off what the first left by rounding.
     for (int round = 0; round < 2; ++round) {
-        Eigen::VectorXd image = equations_.product(vector);
-        factor_->solve(image);
-        vector -= image;
+        BorderedFactor::Sides images = equations_.products(vectors);
+        factor_->solve(images);
+        vectors -= images;
     }
-    return vector;
+    return vectors;
 }
 
 GaussNewton::Step GaussNewton::step(const Eigen::VectorXd& x) const {

@@ -28,8 +28,9 @@ public:
     const BorderedFactor& factor() const { return *factor_; }
     const Eigen::VectorXd& scale() const { return scale_; }  // length of each column of the weighted problem
 
-    // The change of all unknowns that no reading sees when the held unknown changes by 1 (at the last factorisation).
-    Eigen::VectorXd null_vector(int held) const;
+    // For each of at most BorderedFactor::sides held unknowns: the change of all unknowns that no reading sees when it
+    // changes by 1 (at the last factorisation).
+    BorderedFactor::Sides null_vectors(const std::vector<int>& held) const;
 
     static constexpr int usual_most_steps = 100;
     // From x to the minimum: the number of steps, or none where it is not reached in `most_steps`, x being the last.

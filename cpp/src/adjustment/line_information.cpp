@@ -246,7 +246,7 @@ std::vector<bool> LineInformation::State::find_determined(const Equations& at_ze
     for (const int held : factor.held()) {
         if (!std::binary_search(unknowns.begin(), unknowns.end(), held)) continue;
         VectorXd vector = VectorXd::Unit(size, held);
-        for (int round = 0; round < 2; ++round) {  // as GaussNewton::null_vector
+        for (int round = 0; round < 2; ++round) {  // as GaussNewton::null_vectors
             VectorXd image = at_zero.matrix.selfadjointView<Eigen::Lower>() * vector;
             factor.solve(image);
             vector -= image;

@@ -436,6 +436,24 @@ BorderedFactor::Sides NormalEquations::images(const BorderedFactor::Sides& v) co
     return images;
 }
 
-Eigen::VectorXd NormalEquations::product(const Eigen::VectorXd& v) const { return -transposed(-image(v), v); }
+BorderedFactor::Sides NormalEquations::products(const BorderedFactor::Sides& v) const {
+    const BorderedFactor::Sides images = this->images(v);
+    BorderedFactor::Sides products = prior_weight_.asDiagonal() * v;
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!problem_->readings()[r].used()) continue;
+            const Row row = this->row(point, r);
+            for (int i = 0; i < row.size; ++i)
+                if (row.unknown[i] != no_unknown) products.row(row.unknown[i]) += row.derivative[i] * images.row(r);
+        }
+    for (const SmoothRow& row : smooth_) {
+        BorderedFactor::OfSides value = BorderedFactor::OfSides::Zero();
+        for (int i = 0; i < 3; ++i)
+            if (row.unknown[i] != no_unknown) value += row.coefficient[i] * v.row(row.unknown[i]);
+        for (int i = 0; i < 3; ++i)
+            if (row.unknown[i] != no_unknown) products.row(row.unknown[i]) += row.coefficient[i] * value;
+    }
+    return products;
+}
 
 }  // namespace stepdiag

@@ -75,7 +75,7 @@ public:
     Eigen::VectorXd image(const Eigen::VectorXd& v) const;  // J v, of all readings
     // The same of vectors beside each other, with rows beyond the last reading.
     BorderedFactor::Sides images(const BorderedFactor::Sides& v) const;
-    Eigen::VectorXd product(const Eigen::VectorXd& v) const;  // (J^T J + P) v
+    BorderedFactor::Sides products(const BorderedFactor::Sides& v) const;  // (J^T J + P) v
 
     using Side =
         Eigen::Ref<Eigen::VectorXd, 0, Eigen::InnerStride<>>;  // a vector, or a column of BorderedFactor::Sides

@@ -65,11 +65,16 @@ Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables
     const Eigen::VectorXd units = units_of_columns(solver.scale());
     const std::vector<int>& held = solver.dependent();
     Eigen::MatrixXd slopes(sloped.size(), held.size());
-    for (std::size_t h = 0; h < held.size(); ++h) {
-        const Eigen::VectorXd vector = solver.null_vector(held[h]);
-        mark_touched(vector, units, forms, determined_);
-        for (std::size_t i = 0; i < sloped.size(); ++i)
-            slopes(i, h) = tables.slope(sloped[i])->value(vector) / problem_.plan().volume()[index(sloped[i].axis)];
+    for (auto next = held.begin(); next != held.end();) {
+        const std::vector<int> some(next, next + std::min<std::ptrdiff_t>(BorderedFactor::sides, held.end() - next));
+        const BorderedFactor::Sides vectors = solver.null_vectors(some);
+        for (std::size_t k = 0; k < some.size(); ++k, ++next) {
+            const Eigen::VectorXd vector = vectors.col(Eigen::Index(k));
+            mark_touched(vector, units, forms, determined_);
+            for (std::size_t i = 0; i < sloped.size(); ++i)
+                slopes(Eigen::Index(i), next - held.begin()) =
+                    tables.slope(sloped[i])->value(vector) / problem_.plan().volume()[index(sloped[i].axis)];
+        }
     }
     for (const OpenCombination& difference : differences)
         if (difference.form.determined && !determined_[difference.form.unknown[0]]) combinations_.push_back(difference);
