@@ -29,6 +29,9 @@ SimdStart::SimdStart(const PreparedAdjustment& prepared, const std::vector<std::
         weight.push_back(1.0 / reading.standard_uncertainty);
         value.push_back(reading.value);
     }
+    for (const LineSetup& setup : pattern.problem.setups())
+        for (const int column : setup.active)
+            if (column < setup::laser + 2) angles.push_back(setup.unknown[column]);
     for (const double u : standard_uncertainty) one_over_uncertainty.push_back(u > 0.0 ? 1.0 / u : 0.0);
 }
 
@@ -173,16 +176,24 @@ void SimdAdjustment::recentre(std::size_t lane) {
     progress_[lane].recentred = true;
 }
 
-void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride) {
-    begin(readings, stride);
-    centre_.fill(Eigen::VectorXd::Zero(start_.pattern.start.size()));
+void SimdAdjustment::begin_at_angles(const double* readings, std::size_t stride) {
+    first_step(readings, stride);
+    for (std::size_t lane = 0; lane < lane_group; ++lane) {
+        if (progress_[lane].state != Progress::failed) continue;
+        progress_[lane] = {};
+        for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) {
+            x_.at(j)[lane] = start_.pattern.start[j];
+            centre_.at(j)[lane] = 0.0;
+        }
+        for (const int j : start_.angles) x_.at(j)[lane] += dx_.at(j)[lane];
+    }
+}
+
+void SimdAdjustment::take_steps(const double* readings, std::size_t stride, bool has_first) {
     const bool has_open = !start_.pattern.solver.dependent().empty();
-    counts_.fill({0, false});
     const auto goes_on = [](const Progress& p) { return p.state == Progress::goes_on; };
     const auto any_goes_on = [&] { return std::any_of(progress_.begin(), progress_.end(), goes_on); };
-    first_step(readings, stride);
-    start_.jacobian.subtract_product(r_.data(), dx_.data(), s_.data());
-    for (bool is_first = true; any_goes_on(); is_first = false) {
+    for (bool is_first = has_first; any_goes_on(); is_first = false) {
         if (!is_first) step(readings, stride);
         Lanes largest, moves;
         find_largest(start_.pattern.forms, start_.one_over_uncertainty, dx_.data(), largest);
@@ -195,6 +206,19 @@ void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* 
         for (std::size_t lane = 0; has_open && lane < lane_group; ++lane)
             if (moves[lane] != 0.0 && progress_[lane].state == Progress::settled && !progress_[lane].recentred)
                 recentre(lane);
+    }
+}
+
+void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride) {
+    begin(readings, stride);
+    centre_.fill(Eigen::VectorXd::Zero(start_.pattern.start.size()));
+    counts_.fill({0, false});
+    first_step(readings, stride);
+    start_.jacobian.subtract_product(r_.data(), dx_.data(), s_.data());
+    take_steps(readings, stride, true);
+    if (std::any_of(progress_.begin(), progress_.end(), [](const auto& p) { return p.state == Progress::failed; })) {
+        begin_at_angles(readings, stride);
+        take_steps(readings, stride, false);
     }
     Lanes square_sum;
     find_square_sum(square_sum);

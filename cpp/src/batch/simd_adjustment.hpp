@@ -22,6 +22,7 @@ struct SimdStart {
     std::vector<double> weight;                // the same: 1/u
     std::vector<double> value;                 // the same: the pattern's reading
     std::vector<double> one_over_uncertainty;  // for each value of the tables; 0 for values that are 0 by definition
+    std::vector<int> angles;                   // unknowns: of mirrors and lasers
     SimdJacobian jacobian;
     SimdFactor factor;
     TiltEffects tilt_effects;
@@ -90,6 +91,11 @@ private:
     void begin(const double* readings, std::size_t stride);
     void first_step(const double* readings, std::size_t stride);
     void step(const double* readings, std::size_t stride);
+    // Sets that failed once more, from where the first step sees mirrors and lasers, all else being as at the start. At
+    // milliradians the second order of these angles sends what is known worst (a head's roll, a lateral offset) far
+    // away in the first step, and only that.
+    void begin_at_angles(const double* readings, std::size_t stride);
+    void take_steps(const double* readings, std::size_t stride, bool has_first);
     void find_square_sum(double* sum) const;
     void accelerate();
     void move(const double* moves);  // lanes where it is not 0

@@ -50,6 +50,13 @@ TEST(BatchAdjustment, SetUpsFarFromThePatternsTakeFullSteps) {
     }
 }
 
+TEST(BatchAdjustment, SetUpsOfMilliradiansComeOutAsAlone) {
+    Workshop shop;
+    shop.angle = 3e-3;
+    shop.head.aperture = 1000.0, shop.head.mirror = {1000.0, 1000.0};  // no reading is lost
+    expect_same(shop, int(lane_group));
+}
+
 TEST(BatchAdjustment, BeamsWhoseLasersStandAsTheirPriorsSayComeOutAsAlone) {
     Workshop shop = with_beams();
     shop.head.beam_offsets = {{50.0, 0.0}, {-25.0, 43.3}, {-25.0, -43.3}};

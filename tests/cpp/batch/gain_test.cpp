@@ -19,8 +19,13 @@ double condition(const Workshop& shop) {
                                                 shop.head.calibration(), shop.options, {});
     const Eigen::Index unknowns = prepared.start.size();
     Eigen::MatrixXd n(unknowns, unknowns);
-    for (Eigen::Index j = 0; j < unknowns; ++j)
-        n.col(j) = prepared.solver.equations().product(Eigen::VectorXd::Unit(unknowns, j));
+    using stepdiag::BorderedFactor;
+    for (Eigen::Index j = 0; j < unknowns; j += BorderedFactor::sides) {
+        const Eigen::Index count = std::min<Eigen::Index>(BorderedFactor::sides, unknowns - j);
+        BorderedFactor::Sides units = BorderedFactor::Sides::Zero(unknowns, BorderedFactor::sides);
+        units.block(j, 0, count, count).setIdentity();
+        n.middleCols(j, count) = prepared.solver.equations().products(units).leftCols(count);
+    }
     const Eigen::VectorXd scale = n.diagonal().cwiseSqrt().cwiseInverse();
     n = scale.asDiagonal() * n * scale.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(n, Eigen::EigenvaluesOnly);
