@@ -74,6 +74,7 @@ struct Samples {
             bench.head.layout = stepdiag::HeadLayout::psd;
             bench.head.psd_distance = 200.0;
         }
+        bench.head.aperture = 1000.0, bench.head.mirror = {1000.0, 1000.0};  // at 3 mrad no reading is lost
         if (!defaults) options.adjustment = three_quantities();
         options.adjustment.outlier_probability = 0.0;
         options.method = stepdiag::EvaluationMethod::adjustment;
