@@ -71,7 +71,7 @@ def test_smaller_noise_is_measured_and_said() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_many_runs_with_one_set_up_are_accepted_and_their_noise_is_what_it_is(seed: int) -> None:
-    """The set-ups of all runs are the same, so that they scatter far less than their priors: the instrument does not."""
+    """All runs have one set-up, which then scatters far less than its priors: the instrument does not."""
     plan = sd.Plan(VOLUME, DIAGONALS, 3, scale_lines=SCALE_LINES)
     noise = sd.Noise(STATED["distance"], STATED["alpha"], seed=seed)
     run = sd.simulate(MACHINE_OF_THREE, plan, sd.Head(), repeats=100, noise=noise)
