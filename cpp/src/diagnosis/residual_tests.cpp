@@ -139,7 +139,7 @@ std::vector<ResidualPattern> scatter_of_groups(const std::map<Group, Share>& gro
     return patterns;
 }
 
-bool is_likelier(const ResidualPattern& a, const ResidualPattern& b) { return a.probability < b.probability; }
+bool is_more_conspicuous(const ResidualPattern& a, const ResidualPattern& b) { return a.probability < b.probability; }
 
 // --- trends ---
 
@@ -266,7 +266,7 @@ double chi_square(const FitReason& trend) { return std::pow(trend.value / trend.
 void keep_the_best(std::vector<ResidualPattern>& patterns) {
     constexpr double least_share = 0.5;  // of the best one's chi-square
     if (patterns.empty()) return;
-    std::stable_sort(patterns.begin(), patterns.end(), is_likelier);
+    std::stable_sort(patterns.begin(), patterns.end(), is_more_conspicuous);
     const double best = chi_square(patterns.front().reason), alike = patterns.front().probability;
     std::size_t kept = 1;
     while (kept < patterns.size() &&
@@ -313,12 +313,13 @@ std::vector<ResidualPattern> residual_patterns(const Adjustment& adjustment, con
     std::vector<ResidualPattern> scatter = of_groups(adjustment.residuals);
     std::vector<ResidualPattern> trends = trends_of_readings(adjustment, TrendTests(measurement, equations, factor));
     const double tests = double(scatter.size() + trends.size());
-    const auto likeliest = [&] { return std::min_element(scatter.begin(), scatter.end(), is_likelier); };
+    const auto most_conspicuous = [&] { return std::min_element(scatter.begin(), scatter.end(), is_more_conspicuous); };
     // Redundancies by noise alone are the smaller ones: where nothing is conspicuous by all of them, nothing is by
     // those.
-    if (!scatter.empty() && tests * likeliest()->probability < thresholds.pattern) scatter = of_groups(by_noise());
+    if (!scatter.empty() && tests * most_conspicuous()->probability < thresholds.pattern)
+        scatter = of_groups(by_noise());
     if (scatter.size() > 1) {
-        std::iter_swap(scatter.begin(), likeliest());
+        std::iter_swap(scatter.begin(), most_conspicuous());
         scatter.resize(1);
     }
     keep_the_best(trends);
