@@ -47,8 +47,9 @@ def ways_of(known: Known, run: _core.Measurement) -> list[Way]:
     """Every line of every run."""
     distance = distance_of(known, run)
     along = {line: known.plan.frame(line)[:, 2] for line in set(run.line)}
+    position = run.position  # a copy of all
     return [
-        Way(number, line, rows, run.position[rows] @ along[line], distance[rows])
+        Way(number, line, rows, position[rows] @ along[line], distance[rows])
         for (number, line), rows in passes_of(run).items()
     ]
 

@@ -50,13 +50,13 @@ def setup_table(
     standard uncertainties alone. Its rows: names, units, then by run, and in it in the order of `lines`. Beside it,
     notes on unknowns of which next to nothing was learnt."""
     unknowns = sorted((e for e in estimates if e.prior > 0.0), key=lambda e: (e.run, lines.index(e.line)))
-    learnt = [e for e in unknowns if e.value is None or e.standard_uncertainty < NOTHING_LEARNT * e.prior]
+    learnt = [e for e in unknowns if _is_learnt(e)]
     found = {(e.quantity, e.component) for e in learnt if e.value is not None}
     columns = sorted(found, key=lambda column: (list(SETUP_QUANTITIES).index(column[0]), column[1]))
     rows = _table(learnt, columns, _value if values else _uncertainty) if columns else []
     prior: dict[str, list[SetupFound]] = {}
     for estimate in unknowns:
-        if estimate not in learnt:
+        if not _is_learnt(estimate):
             prior.setdefault(estimate.quantity, []).append(estimate)
     notes = []
     for quantity, known in prior.items():
@@ -67,6 +67,10 @@ def setup_table(
         name = quantity.replace("_", " ")
         notes.append(f"{name}: the readings add almost nothing to the prior ({widths} {unit}) on {places}")
     return rows, notes
+
+
+def _is_learnt(estimate: SetupFound) -> bool:
+    return estimate.value is None or estimate.standard_uncertainty < NOTHING_LEARNT * estimate.prior
 
 
 def concise(value: float, uncertainty: float) -> str:
