@@ -1,4 +1,4 @@
-"""All benchmarks in one table, each beside its peer where it has one, in some five minutes.
+"""All benchmarks in one table, each beside its peer where it has one, in some minutes.
 
     ./run bench [--peers] [--only PART] [--plot PICTURE]
 
@@ -76,16 +76,13 @@ def executables(build: Path, only: str) -> dict[str, float]:
     return rows
 
 
-def cpu_seconds(command: list[str], folder: Path, repeats: int) -> float:
-    times = []
+def cpu_seconds(command: list[str], folder: Path) -> float:
     # Modules are compiled once, as they are for users.
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    for _ in range(repeats):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    return min(times)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def commands(only: str) -> dict[str, float]:
@@ -104,12 +101,12 @@ def commands(only: str) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if only in "stepdiag":
-            rows[IMPORTS] = cpu_seconds([sys.executable, "-c", "import numpy"], folder, 3)
+            rows[IMPORTS] = min(cpu_seconds([sys.executable, "-c", "import numpy"], folder) for _ in range(3))
             for job, (arguments, repeats) in jobs.items():
                 print(f"stepdiag {job} ...", file=sys.stderr, flush=True)
                 outputs = [f"cal{k}.csv" if job == "evaluate" else f"report{k}.html" for k in range(repeats)]
                 rows[f"stepdiag {job}"] = min(
-                    cpu_seconds([*start, job, *arguments, *([output] if arguments[-1] == "-o" else [])], folder, 1)
+                    cpu_seconds([*start, job, *arguments, *([output] if arguments[-1] == "-o" else [])], folder)
                     for output in outputs
                 )
     return rows
