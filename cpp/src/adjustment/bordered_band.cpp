@@ -120,6 +120,18 @@ BorderedFactor::Corner BorderedFactor::schur() {
     return Corner(schur_.data(), l_.border_, l_.border_, OuterStride<>(l_.border_step_));
 }
 
+BorderedBand dense_band(const MatrixXd& matrix, int border) {
+    const int blocks = (int(matrix.rows()) - border) / six;
+    BorderedBand band(std::vector<int>(std::size_t(blocks), blocks - 1), border);
+    for (int column = 0; column < blocks; ++column) {
+        for (int row = column; row < blocks; ++row)
+            band.block(row, column) = matrix.block<six, six>(six * row, six * column);
+        band.border_rows(column) = matrix.block(six * blocks, six * column, border, six);
+    }
+    band.corner() = matrix.bottomRightCorner(border, border);
+    return band;
+}
+
 BorderedFactor::ConstCorner BorderedFactor::corner_factor() const {
     return ConstCorner(schur_.data(), corner_rank_, corner_rank_, OuterStride<>(l_.border_step_));
 }

@@ -124,6 +124,9 @@ private:
     Eigen::MatrixXd corner_;
 };
 
+// A matrix without zeros, of which the lower triangle counts: its last rows are the border.
+BorderedBand dense_band(const Eigen::MatrixXd& matrix, int border);
+
 // L of N = L L^T. An unknown whose pivot is at or below `threshold` times its diagonal entry of N depends on those
 // before it, or was never observed: it is held at 0. The border comes last, the corner in the order of falling pivots
 // (each divided by its diagonal entry of N).

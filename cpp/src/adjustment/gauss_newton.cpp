@@ -80,9 +80,7 @@ void GaussNewton::refresh(const Eigen::VectorXd& x) {
     else equations_.linearise(x);
 }
 
-BorderedFactor::Sides GaussNewton::null_vectors(const std::vector<int>& held) const {
-    BorderedFactor::Sides vectors = BorderedFactor::Sides::Zero(scale_.size(), BorderedFactor::sides);
-    for (std::size_t h = 0; h < held.size(); ++h) vectors(held[h], Eigen::Index(h)) = 1.0;
+BorderedFactor::Sides GaussNewton::null_vectors(BorderedFactor::Sides vectors) const {
     // The second round takes off what the first left by rounding.
     for (int round = 0; round < 2; ++round) {
         BorderedFactor::Sides images = equations_.products(vectors);
@@ -90,6 +88,15 @@ BorderedFactor::Sides GaussNewton::null_vectors(const std::vector<int>& held) co
         vectors -= images;
     }
     return vectors;
+}
+
+BorderedFactor::Sides GaussNewton::along_null_vectors(BorderedFactor::Sides coefficients) const {
+    for (int round = 0; round < 2; ++round) {
+        BorderedFactor::Sides solution = coefficients;
+        factor_->solve(solution);
+        coefficients -= equations_.products(solution);
+    }
+    return coefficients;
 }
 
 GaussNewton::Step GaussNewton::step(const Eigen::VectorXd& x) const {

@@ -28,9 +28,12 @@ public:
     const BorderedFactor& factor() const { return *factor_; }
     const Eigen::VectorXd& scale() const { return scale_; }  // length of each column of the weighted problem
 
-    // For each of at most BorderedFactor::sides held unknowns: the change of all unknowns that no reading sees when it
-    // changes by 1 (at the last factorisation).
-    BorderedFactor::Sides null_vectors(const std::vector<int>& held) const;
+    // For changes of held unknowns, 0 for all others: the changes of all unknowns with them that no reading sees (at
+    // the last factorisation).
+    BorderedFactor::Sides null_vectors(BorderedFactor::Sides changes) const;
+    // The same for sums of unknowns, by their coefficients: in the row of a held unknown, how much a sum changes with
+    // the null vector in which that unknown changes by 1.
+    BorderedFactor::Sides along_null_vectors(BorderedFactor::Sides coefficients) const;
 
     static constexpr int usual_most_steps = 100;
     // From x to the minimum: the number of steps, or none where it is not reached in `most_steps`, x being the last.

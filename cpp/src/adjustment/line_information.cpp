@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <utility>
@@ -46,12 +47,26 @@ struct LineEquations {
 struct AxisPlace {
     std::array<double, 2> share;
     std::array<std::array<int, 6>, 2> unknown;
+    bool is_visited = true;  // both, where they have a share
 };
 
 // A point of the grid: its places, and how the axes' errors there move the functional point.
 struct GridPoint {
     std::array<int, 3> place;
     Eigen::Matrix<double, 3, 18> by_errors;
+};
+
+using ErrorCovariance = Eigen::Matrix<double, 6, 6>;  // of the errors at one place with those at another one
+
+// Of the volume, equidistant.
+struct Grid {
+    std::vector<AxisPlace> places;  // of X, Y, Z
+    std::vector<GridPoint> points;
+
+    Grid(const AdjustmentProblem& problem, int positions);
+    // As of KnownByLines. `covariance(i, j)`: of places j <= i.
+    VectorXd variances(const std::vector<bool>& determined,
+                       const std::function<ErrorCovariance(std::size_t, std::size_t)>& covariance) const;
 };
 
 AdjustmentProblem problem_of(const Measurement& run, const Plan& plan, const Chain& chain, const Vector3d& tool,
@@ -65,6 +80,38 @@ AdjustmentProblem problem_of(const Measurement& run, const Plan& plan, const Cha
             "lines: expected nothing but the machine that they have in common, got expansion "
             "coefficients, drifts, smoothness, or an uncertain scale of distances");
     return problem;
+}
+
+[[noreturn]] void refuse_unsolved() {
+    throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
+}
+
+// All but the volume.
+KnownByLines known_parameters(const CalibratedForms& forms, const BorderedBand& inverse, const Plan& plan) {
+    KnownByLines known;
+    known.largest.fill(not_known);
+    known.whole.fill(false);
+    for (int i = 0; i < function_count; ++i) {
+        if (!forms.functions[i]) continue;
+        double variance = 0.0;
+        for (const LinearForm& form : forms.functions[i]->value) variance = std::max(variance, form.variance(inverse));
+        known.largest[i] = std::sqrt(variance);
+        known.whole[i] = forms.slope_determined[i] && int(forms.functions[i]->value.size()) == plan.steps() + 1;
+    }
+    for (int s = 0; s < squareness_count; ++s)
+        if (forms.squarenesses[s]) {
+            known.largest[function_count + s] = std::sqrt(std::max(0.0, forms.squarenesses[s]->variance(inverse)));
+            known.whole[function_count + s] = true;
+        }
+    return known;
+}
+
+bool has(const std::vector<ChosenLine>& lines, const std::vector<ChosenLine>& some) {
+    return std::all_of(some.begin(), some.end(), [&](const ChosenLine& one) {
+        return std::any_of(lines.begin(), lines.end(), [&](const ChosenLine& other) {
+            return other.is_scale_line == one.is_scale_line && other.name == one.name;
+        });
+    });
 }
 
 // By the problem's unknown: that of the first run for the same error, or no_unknown for those of set-ups.
@@ -127,23 +174,22 @@ struct LineInformation::State {
     Index size;                                                   // the machine's unknowns are the first ones
     std::vector<int> unknowns;                                    // of these places, those that are an unknown
     std::map<std::pair<std::string, bool>, LineEquations> lines;  // by name, and whether it is a scale line
-    std::vector<AxisPlace> places;
-    std::vector<GridPoint> points;
+    Grid grid;
+    std::vector<std::vector<ChosenLine>> complete;  // lines that determine everything, as all others with them do
 
-    State(AdjustmentProblem first, int grid);
+    State(AdjustmentProblem first, int positions);
     void add(const AdjustmentProblem& run);
 
     Equations sum(const std::vector<ChosenLine>& chosen, Equations LineEquations::* which) const;
-    BorderedBand band(const MatrixXd& matrix) const;
+    // Without a zero: set-ups couple all nodes of their lines.
+    BorderedBand band(const MatrixXd& matrix) const { return dense_band(matrix, int(size) - 6 * problem.blocks()); }
     // By the machine's unknowns. `marked`: also its forms.
     std::vector<bool> find_determined(const Equations& at_zero, AdjustmentTables& marked) const;
     VectorXd variances_on_grid(const BorderedBand& inverse, const std::vector<bool>& determined) const;
-
-private:
-    void make_grid(int grid);
 };
 
-LineInformation::State::State(AdjustmentProblem first, int grid) : problem(std::move(first)), tables(problem) {
+LineInformation::State::State(AdjustmentProblem first, int positions)
+    : problem(std::move(first)), tables(problem), grid(problem, positions) {
     size = 6 * problem.blocks();
     for (const AxisNode& node : problem.nodes())
         for (const int unknown : node.unknown)
@@ -152,14 +198,12 @@ LineInformation::State::State(AdjustmentProblem first, int grid) : problem(std::
                 size = std::max(size, Index(unknown) + 1);
             }
     std::sort(unknowns.begin(), unknowns.end());
-    make_grid(grid);
 }
 
 void LineInformation::State::add(const AdjustmentProblem& run) {
     const std::vector<int> common = common_unknowns(run, problem);
     Solution solution(run, {});
-    if (!solution.solve_from_zero())
-        throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
+    if (!solution.solve_from_zero()) refuse_unsolved();
     NormalEquations equations(run);
     decltype(lines) added;
     for (const bool zero : {true, false}) {
@@ -177,18 +221,21 @@ void LineInformation::State::add(const AdjustmentProblem& run) {
     lines.merge(added);
 }
 
-void LineInformation::State::make_grid(int grid) {
+Grid::Grid(const AdjustmentProblem& problem, int grid) {
+    if (grid < 2) throw InvalidArgument("grid: expected at least 2 positions an axis");
     const int steps = problem.plan().steps();
     const auto position = [&](Axis axis, int i) { return problem.plan().volume()[index(axis)] * i / (grid - 1); };
     for (const Axis axis : all_axes)
         for (int i = 0; i < grid; ++i) {
             const double along = double(steps) * i / (grid - 1);
             const int low = std::min(int(along), steps - 1);
-            AxisPlace at{{low + 1 - along, along - low}, {}};
+            AxisPlace at{{low + 1 - along, along - low}, {}, true};
             for (int side = 0; side < 2; ++side) {
                 const AxisNode* node = problem.find(axis, low + side, false);
                 if (node) at.unknown[side] = node->unknown;
                 else at.unknown[side].fill(no_unknown);
+                const bool is_home = low + side == 0;
+                at.is_visited = at.is_visited && (node || is_home || at.share[side] == 0.0);
             }
             places.push_back(at);
         }
@@ -224,18 +271,6 @@ Equations LineInformation::State::sum(const std::vector<ChosenLine>& chosen, Equ
     return sum;
 }
 
-// Without a zero: set-ups couple all nodes of their lines.
-BorderedBand LineInformation::State::band(const MatrixXd& matrix) const {
-    const int blocks = problem.blocks(), border = int(size) - 6 * blocks;
-    BorderedBand band(std::vector<int>(std::size_t(blocks), blocks - 1), border);
-    for (int column = 0; column < blocks; ++column) {
-        for (int row = column; row < blocks; ++row) band.block(row, column) = matrix.block<6, 6>(6 * row, 6 * column);
-        band.border_rows(column) = matrix.block(6 * blocks, 6 * column, border, 6);
-    }
-    band.corner() = matrix.bottomRightCorner(border, border);
-    return band;
-}
-
 std::vector<bool> LineInformation::State::find_determined(const Equations& at_zero, AdjustmentTables& marked) const {
     BorderedBand matrix = band(at_zero.matrix);
     for (const int u : unknowns)
@@ -258,9 +293,9 @@ std::vector<bool> LineInformation::State::find_determined(const Equations& at_ze
 
 VectorXd LineInformation::State::variances_on_grid(const BorderedBand& inverse,
                                                    const std::vector<bool>& determined) const {
-    using Block = Eigen::Matrix<double, 6, 6>;
-    const auto covariance = [&](const AxisPlace& one, const AxisPlace& other) {
-        Block block = Block::Zero();
+    return grid.variances(determined, [&](std::size_t at, std::size_t with) {
+        const AxisPlace &one = grid.places[at], &other = grid.places[with];
+        ErrorCovariance block = ErrorCovariance::Zero();
         for (int i = 0; i < 2; ++i)
             for (int j = 0; j < 2; ++j)
                 if (const double share = one.share[i] * other.share[j]; share > 0.0)
@@ -269,15 +304,19 @@ VectorXd LineInformation::State::variances_on_grid(const BorderedBand& inverse,
                             if (one.unknown[i][r] != no_unknown && other.unknown[j][c] != no_unknown)
                                 block(r, c) += share * element(inverse, one.unknown[i][r], other.unknown[j][c]);
         return block;
-    };
-    const std::size_t grid = places.size() / 3;
-    std::vector<Block> blocks(places.size() * places.size());  // of places that some point has both of
+    });
+}
+
+VectorXd Grid::variances(const std::vector<bool>& determined,
+                         const std::function<ErrorCovariance(std::size_t, std::size_t)>& covariance) const {
+    const std::size_t grid = places.size() / 3;                          // positions of an axis
+    std::vector<ErrorCovariance> blocks(places.size() * places.size());  // of places that some point has both of
     std::vector<std::array<bool, 6>> open(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         for (std::size_t j = 0; j <= i; ++j)
-            if (i == j || i / grid != j / grid) blocks[i * places.size() + j] = covariance(places[i], places[j]);
+            if (i == j || i / grid != j / grid) blocks[i * places.size() + j] = covariance(i, j);
         for (int c = 0; c < 6; ++c) {
-            open[i][c] = false;
+            open[i][c] = !places[i].is_visited;
             for (int side = 0; side < 2; ++side)
                 if (const int u = places[i].unknown[side][c]; u != no_unknown && places[i].share[side] > 0.0)
                     open[i][c] = open[i][c] || !determined[u];
@@ -292,7 +331,7 @@ VectorXd LineInformation::State::variances_on_grid(const BorderedBand& inverse,
             for (int c = 0; c < 6; ++c)
                 if (open[point.place[a]][c] && by_a.col(c).norm() > moves) variance = not_known;
             for (int b = 0; b <= a; ++b) {
-                const Block& block = blocks[std::size_t(point.place[a]) * places.size() + point.place[b]];
+                const ErrorCovariance& block = blocks[std::size_t(point.place[a]) * places.size() + point.place[b]];
                 const auto by_b = point.by_errors.middleCols<6>(6 * b);
                 variance += (a == b ? 1.0 : 2.0) * (by_a * block).cwiseProduct(by_b).sum();
             }
@@ -304,7 +343,6 @@ VectorXd LineInformation::State::variances_on_grid(const BorderedBand& inverse,
 
 LineInformation::LineInformation(const Measurement& run, const Plan& plan, const Chain& chain, const Vector3d& tool,
                                  const HeadCalibrations& heads, const AdjustmentOptions& options, int grid) {
-    if (grid < 2) throw InvalidArgument("grid: expected at least 2 positions an axis");
     AdjustmentProblem problem = problem_of(run, plan, chain, tool, heads, options);
     state_ = std::make_shared<State>(problem, grid);
     state_->add(problem);
@@ -318,33 +356,62 @@ void LineInformation::add(const Measurement& run, const Plan& plan, const HeadCa
     state_->add(problem_of(run, plan, state_->problem.chain(), state_->problem.tool(), heads, options));
 }
 
-KnownByLines LineInformation::known_by(const std::vector<ChosenLine>& lines) const {
-    const State& state = *state_;
+KnownByLines LineInformation::known_by(const std::vector<ChosenLine>& lines) {
+    State& state = *state_;
     AdjustmentTables tables = state.tables;
-    const std::vector<bool> determined = state.find_determined(state.sum(lines, &LineEquations::at_zero), tables);
+    std::vector<bool> determined(std::size_t(state.size), true);
+    if (std::none_of(state.complete.begin(), state.complete.end(),
+                     [&](const auto& some) { return has(lines, some); })) {
+        determined = state.find_determined(state.sum(lines, &LineEquations::at_zero), tables);
+        if (std::find(determined.begin(), determined.end(), false) == determined.end()) state.complete.push_back(lines);
+    }
     const CalibratedForms forms = choose_forms(tables);
     Equations at_machine = state.sum(lines, &LineEquations::at_machine);
     for (const int u : state.unknowns)
         if (!determined[u]) at_machine.matrix(u, u) += std::pow(state.problem.usual()[u], -2);
     const BorderedBand inverse = BorderedFactor(state.band(at_machine.matrix), rank_threshold).selected_inverse();
 
-    KnownByLines known;
-    known.largest.fill(not_known);
-    known.whole.fill(false);
-    for (int i = 0; i < function_count; ++i) {
-        if (!forms.functions[i]) continue;
-        double variance = 0.0;
-        for (const LinearForm& form : forms.functions[i]->value) variance = std::max(variance, form.variance(inverse));
-        known.largest[i] = std::sqrt(variance);
-        known.whole[i] =
-            forms.slope_determined[i] && int(forms.functions[i]->value.size()) == state.problem.plan().steps() + 1;
-    }
-    for (int s = 0; s < squareness_count; ++s)
-        if (forms.squarenesses[s]) {
-            known.largest[function_count + s] = std::sqrt(std::max(0.0, forms.squarenesses[s]->variance(inverse)));
-            known.whole[function_count + s] = true;
-        }
+    KnownByLines known = known_parameters(forms, inverse, state.problem.plan());
     known.volume = state.variances_on_grid(inverse, determined);
+    return known;
+}
+
+KnownByLines known_by_run(const Measurement& run, const Plan& plan, const Chain& chain, const Vector3d& tool,
+                          const HeadCalibrations& heads, const AdjustmentOptions& options, int positions) {
+    Solution solution(problem_of(run, plan, chain, tool, heads, options), {});
+    if (!solution.problem().has_rotations()) throw InvalidArgument("adjustment: expected rotations to be unknowns");
+    if (!solution.solve_from_zero()) refuse_unsolved();
+    const AdjustmentProblem& problem = solution.problem();
+    const CalibratedForms forms = choose_forms(solution.tables());
+    const BorderedBand& inverse = solution.inverse();
+    KnownByLines known = known_parameters(forms, inverse, plan);
+    if (std::none_of(known.largest.begin(), known.largest.end(), [](double u) { return std::isfinite(u); }))
+        throw InvalidArgument("adjustment: nothing can be determined");
+
+    const Grid grid(problem, positions);
+    // How all unknowns vary with each error of each place.
+    MatrixXd with_errors(problem.size(), 6 * Index(grid.places.size()));
+    for (Index first = 0; first < with_errors.cols(); first += BorderedFactor::sides) {
+        const Index count = std::min<Index>(BorderedFactor::sides, with_errors.cols() - first);
+        BorderedFactor::Sides errors = BorderedFactor::Sides::Zero(problem.size(), BorderedFactor::sides);
+        for (Index k = 0; k < count; ++k) {
+            const AxisPlace& place = grid.places[std::size_t(first + k) / 6];
+            for (int side = 0; side < 2; ++side)
+                if (const int u = place.unknown[side][std::size_t(first + k) % 6]; u != no_unknown)
+                    errors(u, k) += place.share[side];
+        }
+        solution.solver().factor().solve(errors);
+        with_errors.middleCols(first, count) = errors.leftCols(count);
+    }
+    known.volume = grid.variances(solution.observability().determined(), [&](std::size_t at, std::size_t with) {
+        ErrorCovariance block = ErrorCovariance::Zero();
+        const AxisPlace& place = grid.places[at];
+        for (int side = 0; side < 2; ++side)
+            for (int c = 0; c < 6; ++c)
+                if (const int u = place.unknown[side][c]; u != no_unknown)
+                    block.row(c) += place.share[side] * with_errors.block<1, 6>(u, 6 * Index(with));
+        return block;
+    });
     return known;
 }
 

@@ -5,17 +5,33 @@
 #include <cmath>
 #include <map>
 
+#include "stepdiag/core/random.hpp"
+
 namespace stepdiag {
 namespace {
 
 // A null vector touches a sum of unknowns where it changes it by more than this part of what unknowns of that size may:
 // well above rounding (1e-16 times the square of the condition), well below the least share of a slope, 1/steps.
 constexpr double touching = 1e-5;
+// So many null vectors are looked at one by one. What more of them touch, a few sums of all with random weights touch,
+// and with as many sums as there are slopes and more these span what the slopes do (N. Halko, P. G. Martinsson and J.
+// A. Tropp, SIAM Review 53 (2011) 217): the time is proportional to the number of steps, not to its square.
+constexpr Eigen::Index few_vectors = 256, sums = 4 * BorderedFactor::sides;
 
 bool touches(const Eigen::VectorXd& vector, const LinearForm& form, const Eigen::VectorXd& units, double largest) {
     double possible = 0.0;
     for (int i = 0; i < form.size; ++i) possible += std::abs(form.coefficient[i]) * units[form.unknown[i]];
     return std::abs(form.value(vector)) > touching * largest * possible;
+}
+
+// By held unknown, its change in each null vector that is looked at, in its unit.
+Eigen::MatrixXd changes_of_held(Eigen::Index held) {
+    if (held <= few_vectors) return Eigen::MatrixXd::Identity(held, held);
+    Eigen::MatrixXd changes(held, sums);
+    for (Eigen::Index i = 0; i < held; ++i)
+        for (Eigen::Index k = 0; k < sums; ++k)
+            changes(i, k) = normal_pair(0, RandomStream::null_vectors, std::uint64_t(i * sums + k))[0];
+    return changes;
 }
 
 // The quantity that a column of a set-up's vector stands for, and its component.
@@ -41,9 +57,6 @@ void mark_touched(const Eigen::VectorXd& null_vector, const Eigen::VectorXd& uni
 
 Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables)
     : problem_(solver.equations().problem()), tables_(tables), determined_(problem_.size(), true) {
-    std::vector<FunctionId> sloped;
-    for (int i = 0; i < function_count; ++i)
-        if (tables.slope(FunctionId::at(i))) sloped.push_back(FunctionId::at(i));
     std::vector<LinearForm*> forms = tables.all();
     // A tilt reads reflector minus laser: where each of them is open, that may be known.
     std::vector<OpenCombination> differences;
@@ -64,31 +77,45 @@ Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables
 
     const Eigen::VectorXd units = units_of_columns(solver.scale());
     const std::vector<int>& held = solver.dependent();
-    Eigen::MatrixXd slopes(sloped.size(), held.size());
-    for (auto next = held.begin(); next != held.end();) {
-        const std::vector<int> some(next, next + std::min<std::ptrdiff_t>(BorderedFactor::sides, held.end() - next));
-        const BorderedFactor::Sides vectors = solver.null_vectors(some);
-        for (std::size_t k = 0; k < some.size(); ++k, ++next) {
-            const Eigen::VectorXd vector = vectors.col(Eigen::Index(k));
-            mark_touched(vector, units, forms, determined_);
-            for (std::size_t i = 0; i < sloped.size(); ++i)
-                slopes(Eigen::Index(i), next - held.begin()) =
-                    tables.slope(sloped[i])->value(vector) / problem_.plan().volume()[index(sloped[i].axis)];
-        }
+    const Eigen::MatrixXd changes = changes_of_held(Eigen::Index(held.size()));
+    for (Eigen::Index first = 0; first < changes.cols(); first += BorderedFactor::sides) {
+        const Eigen::Index count = std::min<Eigen::Index>(BorderedFactor::sides, changes.cols() - first);
+        BorderedFactor::Sides some = BorderedFactor::Sides::Zero(units.size(), BorderedFactor::sides);
+        for (std::size_t h = 0; h < held.size(); ++h)
+            some.row(held[h]).head(count) = units[held[h]] * changes.row(Eigen::Index(h)).segment(first, count);
+        const BorderedFactor::Sides vectors = solver.null_vectors(std::move(some));
+        for (Eigen::Index k = 0; k < count; ++k) mark_touched(vectors.col(k), units, forms, determined_);
     }
     for (const OpenCombination& difference : differences)
         if (difference.form.determined && !determined_[difference.form.unknown[0]]) combinations_.push_back(difference);
-    combine_slopes(slopes, sloped);
+    combine_slopes(solver);
 }
 
 // Combinations of the scales and squarenesses that are not known one by one: what no null vector changes.
-void Observability::combine_slopes(const Eigen::MatrixXd& slopes, const std::vector<FunctionId>& functions) {
-    std::vector<Eigen::Index> open;
-    for (std::size_t i = 0; i < functions.size(); ++i)
-        if (!functions[i].is_rotation() && !tables_.slope(functions[i])->determined) open.push_back(Eigen::Index(i));
-    if (open.size() < 2 || slopes.cols() == 0) return;
-    Eigen::MatrixXd part(open.size(), slopes.cols());
-    for (std::size_t i = 0; i < open.size(); ++i) part.row(Eigen::Index(i)) = slopes.row(open[i]);
+void Observability::combine_slopes(const GaussNewton& solver) {
+    std::vector<FunctionId> open;
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        const auto& slope = tables_.slope(id);
+        if (slope && !slope->determined && !id.is_rotation()) open.push_back(id);
+    }
+    const std::vector<int>& held = solver.dependent();
+    if (open.size() < 2 || held.empty()) return;
+    Eigen::MatrixXd part(open.size(), held.size());
+    for (std::size_t first = 0; first < open.size(); first += BorderedFactor::sides) {
+        const std::size_t count = std::min<std::size_t>(BorderedFactor::sides, open.size() - first);
+        BorderedFactor::Sides slopes = BorderedFactor::Sides::Zero(solver.scale().size(), BorderedFactor::sides);
+        for (std::size_t i = 0; i < count; ++i) {
+            const LinearForm& slope = *tables_.slope(open[first + i]);
+            for (int j = 0; j < slope.size; ++j)
+                slopes(slope.unknown[j], Eigen::Index(i)) +=
+                    slope.coefficient[j] / problem_.plan().volume()[index(open[first + i].axis)];
+        }
+        const BorderedFactor::Sides changes = solver.along_null_vectors(std::move(slopes));
+        for (std::size_t i = 0; i < count; ++i)
+            for (std::size_t h = 0; h < held.size(); ++h)
+                part(Eigen::Index(first + i), Eigen::Index(h)) = changes(held[h], Eigen::Index(i));
+    }
     for (Eigen::Index h = 0; h < part.cols(); ++h)
         if (const double size = part.col(h).norm(); size > 0.0) part.col(h) /= size;
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(part, Eigen::ComputeFullU);
@@ -103,7 +130,7 @@ void Observability::combine_slopes(const Eigen::MatrixXd& slopes, const std::vec
         for (std::size_t i = 0; i < open.size(); ++i) {
             const double weight = weights[Eigen::Index(i)];
             if (std::abs(weight) < 1e-3 || combination.form.size == 6) continue;
-            const FunctionId id = functions[open[i]];
+            const FunctionId id = open[i];
             const LinearForm& slope = *tables_.slope(id);
             combination.form.add(slope.unknown[0], weight / problem_.plan().volume()[index(id.axis)]);
             combination.combination.terms.push_back({weight, id.name()});

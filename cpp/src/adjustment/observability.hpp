@@ -32,7 +32,7 @@ public:
     const std::vector<OpenCombination>& combinations() const { return combinations_; }
 
 private:
-    void combine_slopes(const Eigen::MatrixXd& slopes, const std::vector<FunctionId>& functions);
+    void combine_slopes(const GaussNewton& solver);
     void add_functions(std::vector<Undetermined>& findings) const;
     Undetermined open_slope(FunctionId id) const;
     void add_reversal(std::vector<Undetermined>& findings) const;

@@ -566,6 +566,17 @@ void bind_line_information(py::module_& m) {
                 return names;
             },
             "Parameters that are determined as a whole.");
+    m.def(
+        "known_by_run",
+        [](const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
+           const ArrayLike& tool, const AdjustmentOptions& options, int grid) {
+            return known_by_run(measurement, plan, to_chain(chain), to_vector3(tool, "tool"),
+                                to_heads(head, plan).calibration(), options, grid);
+        },
+        py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"), py::arg("tool"), py::arg("options"),
+        py::kw_only(), py::arg("grid"),
+        "What adjust() knows by a run without noise (KnownByLines), without its tests of the readings. Raises "
+        "InvalidArgument as LineInformation does, and where nothing is determined.");
     py::class_<LineInformation>(
         m, "LineInformation",
         "What each line of a run tells of a machine, for comparing thousands of choices of lines with the same "
@@ -591,7 +602,7 @@ void bind_line_information(py::module_& m) {
             "Lines of another run of as many steps, but for those that there are already. Raises InvalidArgument.")
         .def(
             "known_by",
-            [](const LineInformation& lines, const std::vector<std::string>& chosen,
+            [](LineInformation& lines, const std::vector<std::string>& chosen,
                const std::vector<std::string>& scale_lines) {
                 std::vector<ChosenLine> all;
                 for (const std::string& line : chosen) all.push_back({line, false});

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "options.hpp"
+#include "stepdiag/recheck/changes_seen.hpp"
 #include "stepdiag/recheck/recheck.hpp"
 #include "stepdiag/recheck/verification.hpp"
 #include "struct_table.hpp"
@@ -135,9 +136,49 @@ static void bind_recheck_of_run(py::module_& m) {
         "verify does.");
 }
 
+SeenChanges seen_by(ChangesSeen& changes, const std::vector<std::string>& lines,
+                    const std::vector<std::string>& scale_lines, int repeats, double alpha, double power) {
+    std::vector<ChosenLine> chosen;
+    for (const std::string& line : lines) chosen.push_back({line, false});
+    for (const std::string& line : scale_lines) chosen.push_back({line, true});
+    const py::gil_scoped_release release;
+    return changes.by(chosen, repeats, alpha, power);
+}
+
+static void bind_changes_seen(py::module_& m) {
+    bind_record(m, "SeenChanges", "What a recheck by some lines would know of the changes of a machine.",
+                field("smallest", &SeenChanges::smallest,
+                      "(n,) smallest change of each term that is seen, as Recheck.smallest_changes_seen."),
+                field("covariance", &SeenChanges::covariance, "(n, n) of the terms, with their priors."));
+    py::class_<ChangesSeen>(
+        m, "ChangesSeen",
+        "Which changes of a machine short runs would show, before anyone measures: by() of some lines gives the "
+        "figures of recheck(), for many choices of lines with the same steps.")
+        .def(py::init([](const Calibration& baseline, const Measurement& measurement, const Plan& plan,
+                         const HeadLike& head, const ChainLike& chain, const ArrayLike& tool,
+                         const AdjustmentOptions& options, const ChangePriors& priors) {
+                 return ChangesSeen(baseline, measurement, plan, to_chain(chain), to_vector3(tool, "tool"),
+                                    to_heads(head, plan).calibration(), options, priors);
+             }),
+             py::arg("baseline"), py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
+             py::arg("tool"), py::arg("options"), py::arg("priors"),
+             "Of readings without noise of a machine as the baseline has it, at temperatures that stay, each line "
+             "measured once. Raises InvalidArgument as recheck.")
+        .def_property_readonly(
+            "terms", [](const ChangesSeen& c) { return to_tuple(c.terms()); },
+            "A ChangeTerm for each way in which the machine may change; their values are not estimated.")
+        .def_property_readonly(
+            "shape", [](const ChangesSeen& c) { return to_numpy(c.shape()); }, "As Recheck.shape.")
+        .def("by", &seen_by, py::arg("lines"), py::arg("scale_lines"), py::kw_only(), py::arg("repeats") = 1,
+             py::arg("alpha") = 0.001, py::arg("power") = 0.95,
+             "SeenChanges of lines of the run, measured `repeats` times. Raises InvalidArgument, also where so few "
+             "readings would tell nothing of the machine.");
+}
+
 void bind_rechecking(py::module_& m) {
     bind_changes(m);
     bind_recheck_of_run(m);
+    bind_changes_seen(m);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recheck/told_changes.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -128,6 +129,10 @@ void Baseline::find_root(const std::vector<int>& entries) {
 Eigen::MatrixXd Baseline::rest_covariance() const {
     const auto own = root_.leftCols(own_columns_);
     return calibration_.covariance - own * own.transpose();
+}
+
+Eigen::MatrixXd Baseline::shape() const {
+    return root_.rightCols(Eigen::Index(changes_.size())) * priors_of(changes_).cwiseInverse().asDiagonal();
 }
 
 void Baseline::add_change(const ChangeTerm& change) {

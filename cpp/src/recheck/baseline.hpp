@@ -39,6 +39,7 @@ public:
     Eigen::MatrixXd rest_covariance() const;
     // A column of the root each, the last ones, with their priors; values are not estimated here.
     const std::vector<ChangeTerm>& changes() const { return changes_; }
+    Eigen::MatrixXd shape() const;  // by a change of 1 of each term: of each entry
 
 private:
     std::vector<int> read_entries(const Positions& read) const;

@@ -24,19 +24,6 @@ Eigen::MatrixXd without_columns(const Eigen::MatrixXd& matrix, Eigen::Index begi
     return rest;
 }
 
-// sum += a^T a, the lower triangle, by the kernel of products: Eigen's own takes the oldest instruction set.
-void add_square(const Eigen::MatrixXd& a, Eigen::MatrixXd& sum) {
-    constexpr Eigen::Index panel = 48, whole = 24;  // columns, in whole sixes and vectors
-    const Eigen::Index size = (a.cols() + whole - 1) / whole * whole;
-    Eigen::MatrixXd transposed = Eigen::MatrixXd::Zero(size, a.rows());
-    transposed.topRows(a.cols()) = a.transpose();
-    Eigen::MatrixXd negative = Eigen::MatrixXd::Zero(size, size);
-    for (Eigen::Index j = 0; j < size; j += panel)
-        subtract_product(size - j, std::min(panel, size - j), a.rows(), MatrixView{&transposed(j, 0), size},
-                         {&transposed(j, 0), 1, size}, {&negative(j, j), size});
-    sum.triangularView<Eigen::Lower>() -= negative.topLeftCorner(a.cols(), a.cols());
-}
-
 constexpr int most_steps = 100;
 constexpr double settled = 1e-8;   // decrease of the square sum, by reading or, where it is larger, by itself
 constexpr double unmoved = 1e-12;  // decrease, by which a step is below a millionth of any standard uncertainty
@@ -53,6 +40,23 @@ double descend(const At& at, double before) {
 }
 
 }  // namespace
+
+// By the kernel of products: Eigen's own takes the oldest instruction set.
+void add_square(const Eigen::MatrixXd& a, Eigen::MatrixXd& sum) {
+    constexpr Eigen::Index panel = 48, whole = 24;  // columns, in whole sixes and vectors
+    constexpr Eigen::Index few = 96;                // rows: what is multiplied stays in the cache
+    const Eigen::Index size = (a.cols() + whole - 1) / whole * whole;
+    Eigen::MatrixXd transposed = Eigen::MatrixXd::Zero(size, std::min(few, a.rows()));
+    Eigen::MatrixXd negative = Eigen::MatrixXd::Zero(size, size);
+    for (Eigen::Index first = 0; first < a.rows(); first += few) {
+        const Eigen::Index count = std::min(few, a.rows() - first);
+        transposed.topLeftCorner(a.cols(), count) = a.middleRows(first, count).transpose();
+        for (Eigen::Index j = 0; j < size; j += panel)
+            subtract_product(size - j, std::min(panel, size - j), count, MatrixView{&transposed(j, 0), size},
+                             {&transposed(j, 0), 1, size}, {&negative(j, j), size});
+    }
+    sum.triangularView<Eigen::Lower>() -= negative.topLeftCorner(a.cols(), a.cols());
+}
 
 Baseline::Positions read_positions(const AdjustmentProblem& problem) {
     Baseline::Positions read;
@@ -345,6 +349,18 @@ double Prediction::step() {
     return 0.0;
 }
 
+std::vector<Prediction::Derivatives> Prediction::derivatives() {
+    settle_setups();
+    linearise(true);
+    std::vector<Derivatives> derivatives;
+    for (std::size_t k = 0; k < setups_.size(); ++k) {
+        const LineSetup& setup = problem_.setups()[k];
+        derivatives.push_back({setups_[k].by_setup, setups_[k].by_baseline, setups_[k].weight, {}});
+        for (const int column : setup.active) derivatives.back().is_free.push_back(!std::isfinite(setup.prior[column]));
+    }
+    return derivatives;
+}
+
 void Prediction::solve() {
     settle_setups();
     linearise(false);
@@ -416,7 +432,6 @@ Eigen::MatrixXd Prediction::covariance_columns(Eigen::Index begin, Eigen::Index 
 }
 
 ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
-    constexpr double told = 1e-2;  // below, what a prior allows changes the square sum by less, be it there or not
     constexpr double near =
         20.0;  // priors, and 4 standard uncertainties: no change farther away is near the calibration
     ChiSquare test{chi_square(), used_};
@@ -424,7 +439,7 @@ ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information(begin, count));
         const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * z_.segment(begin, count);
         for (Eigen::Index k = 0; k < count; ++k)
-            if (const double information = parts.eigenvalues()[k]; information >= told) {
+            if (const double information = parts.eigenvalues()[k]; information >= least_information) {
                 const double estimate = drawn[k] * (1.0 + information) / information;
                 if (std::abs(estimate) > near + 4.0 / std::sqrt(information)) continue;
                 test.square_sum -= estimate * drawn[k];

@@ -13,6 +13,12 @@
 
 namespace stepdiag {
 
+// sum += a^T a, the lower triangle.
+void add_square(const Eigen::MatrixXd& a, Eigen::MatrixXd& sum);
+
+// Of components of z. Below, what a prior allows changes the square sum by less, be it there or not.
+inline constexpr double least_information = 1e-2;
+
 // Of all points with readings.
 Baseline::Positions read_positions(const AdjustmentProblem& problem);
 
@@ -22,6 +28,14 @@ class Prediction {
 public:
     // `sent`: see verify().
     Prediction(const AdjustmentProblem& problem, const Baseline& baseline, MotorShifts sent = {});
+
+    // Of the readings of a set-up, a row each, at the calibration's values and the set-up that fits best there.
+    struct Derivatives {
+        Eigen::MatrixXd by_setup, by_baseline;
+        Eigen::VectorXd weight;     // 1/u^2 of the priors of the set-up's unknowns
+        std::vector<bool> is_free;  // those without a prior, whose weight hardly counts
+    };
+    std::vector<Derivatives> derivatives();  // by set-up
 
     // To the minimum of e^T e + z^T z + priors of s. Where that is not reached, as near as it gets: the square sum is
     // then larger than the minimum.

@@ -1,38 +1,26 @@
 #include "stepdiag/recheck/recheck.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "evaluation/fit_test.hpp"
 #include "recheck/prediction.hpp"
 #include "recheck/same_machine.hpp"
+#include "recheck/told_changes.hpp"
 #include "recheck/wrong_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 namespace {
 
-// What the readings tell of the changes by their priors, everything else being estimated with them.
-struct Told {
-    Eigen::VectorXd information;  // of each direction, ascending: 1 is as much as the priors tell
-    Eigen::MatrixXd direction;    // a column each
-    Eigen::VectorXd estimate;     // along it, 0 where there is no information
-    Eigen::Index first;           // from here on they tell more than the priors
-};
-
-// By the normal equations at the estimate with priors, which draw it towards 0 along each direction.
-Told told_of_changes(const Prediction& prediction, Eigen::Index begin, Eigen::Index count) {
-    const Eigen::MatrixXd information = prediction.information(begin, count);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information);
-    const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * prediction.values().segment(begin, count);
-    Told told{parts.eigenvalues(), parts.eigenvectors(), Eigen::VectorXd::Zero(count), count};
-    for (Eigen::Index k = count; k-- > 0 && told.information[k] >= 1.0;) {
-        told.first = k;
-        told.estimate[k] = drawn[k] * (1.0 + told.information[k]) / told.information[k];
-    }
-    return told;
+// By direction, 0 where there is no information: the priors draw what is found at the estimate with them towards 0.
+Eigen::VectorXd estimate(const ToldChanges& told, const Eigen::VectorXd& found) {
+    const Eigen::VectorXd drawn = told.direction.transpose() * found;
+    Eigen::VectorXd estimate = Eigen::VectorXd::Zero(found.size());
+    for (Eigen::Index k = told.first; k < found.size(); ++k)
+        estimate[k] = drawn[k] * (1.0 + told.information[k]) / told.information[k];
+    return estimate;
 }
 
 Calibration with_change(const Baseline& baseline, const Prediction& prediction) {
@@ -67,7 +55,8 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
 
     Prediction changed(problem, changing);
     changed.solve();
-    const Told told = told_of_changes(changed, begin, count);
+    const ToldChanges told(changed.information(begin, count));
+    const Eigen::VectorXd found = estimate(told, changed.values().segment(begin, count));
 
     Recheck result{0.0,
                    0,
@@ -80,7 +69,7 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
                    {},
                    {},
                    update ? with_change(changing, changed) : changing.calibration()};
-    result.chi_square = told.estimate.cwiseAbs2().dot(told.information);
+    result.chi_square = found.cwiseAbs2().dot(told.information);
     result.degrees_of_freedom = int(count - told.first);
     if (result.degrees_of_freedom > 0)
         result.probability = chi_square_probability(result.chi_square, result.degrees_of_freedom);
@@ -88,11 +77,10 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
     result.fit_chi_square = fit.square_sum;
     result.fit_degrees_of_freedom = fit.freedom;
     if (fit.freedom > 0) result.fit_probability = chi_square_probability(fit.square_sum, fit.freedom);
-    Eigen::VectorXd prior(count);
-    for (Eigen::Index j = 0; j < count; ++j) prior[j] = changing.changes()[std::size_t(j)].prior;
+    const Eigen::VectorXd prior = priors_of(changing.changes());
     result.covariance =
         prior.asDiagonal() * changed.covariance_columns(begin, count).middleRows(begin, count) * prior.asDiagonal();
-    result.shape = changing.root().rightCols(count) * prior.cwiseInverse().asDiagonal();
+    result.shape = changing.shape();
     const Eigen::MatrixXd strong = told.direction.rightCols(count - told.first);
     for (Eigen::Index j = 0; j < count; ++j) {
         ChangeTerm& term = result.terms[std::size_t(j)];
@@ -100,11 +88,7 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
         term.standard_uncertainty = std::sqrt(result.covariance(j, j));
         term.determined = strong.row(j).squaredNorm();
     }
-    for (Eigen::Index k = count; k-- > told.first;) {
-        ChangeCombination sum{{}, told.estimate[k], 1.0 / std::sqrt(told.information[k])};
-        for (Eigen::Index j = 0; j < count; ++j) sum.weight.push_back(told.direction(j, k));
-        result.combinations.push_back(std::move(sum));
-    }
+    result.combinations = told.combinations(found);
     constexpr std::size_t shown = 5;
     std::vector<Misfit> misfits;
     if (result.fit_probability < readings_asked_below) misfits = largest_misfits(problem, changed, shown);
@@ -121,19 +105,7 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
 }  // namespace
 
 Eigen::VectorXd smallest_changes_seen(const Recheck& recheck, double alpha, double power) {
-    if (!(0.0 < alpha && alpha < power && power < 1.0))
-        throw InvalidArgument("alpha, power: expected probabilities, 0 < alpha < power < 1");
-    constexpr double rounding = 1e-6;  // of a weight
-    const double needed = noncentrality(int(recheck.combinations.size()), alpha, power);
-    Eigen::VectorXd smallest(Eigen::Index(recheck.terms.size()));
-    for (Eigen::Index j = 0; j < smallest.size(); ++j) {
-        double by_prior = 0.0;  // noncentrality by the square of a change in units of its prior
-        for (const ChangeCombination& sum : recheck.combinations)
-            if (const double weight = sum.weight[std::size_t(j)]; std::abs(weight) > rounding)
-                by_prior += std::pow(weight / sum.standard_uncertainty, 2);
-        smallest[j] = recheck.terms[std::size_t(j)].prior * std::sqrt(needed / by_prior);
-    }
-    return smallest;
+    return smallest_changes(recheck.combinations, priors_of(recheck.terms), alpha, power);
 }
 
 std::string name(ChangeKind kind) {
@@ -148,9 +120,7 @@ std::string name(ChangeKind kind) {
 Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options,
                 const ChangePriors& priors, bool update) {
-    check_same_machine(baseline, plan, chain, tool, options);
-    AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
-    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    AdjustmentProblem problem = problem_of_known_machine(baseline, measurement, plan, chain, tool, heads, options);
     const Baseline changing(baseline, priors, read_positions(problem));
     return judge_without_wrong_readings(
         {measurement, plan, chain, tool, heads, options}, problem,

@@ -33,18 +33,19 @@ void check_same_temperature(const Calibration& calibration, const std::optional<
 
 }  // namespace
 
-void check_same_machine(const Calibration& calibration, const Plan& plan, const Chain& chain,
-                        const Eigen::Vector3d& tool, const AdjustmentOptions& options) {
+AdjustmentProblem problem_of_known_machine(const Calibration& calibration, const Measurement& measurement,
+                                           const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                                           const HeadCalibrations& heads, const AdjustmentOptions& options) {
     check_same_parts(calibration, plan, chain, tool);
     check_same_temperature(calibration, options.expansion);
-}
-
-AdjustmentOptions of_known_machine(AdjustmentOptions options) {
-    options.machine_drift.reset();
-    options.rotations = true;
-    options.reversal = false;  // of the unknowns: the calibration has its own
-    options.smoothness.reset();
-    return options;
+    AdjustmentOptions of_known_machine = options;
+    of_known_machine.machine_drift.reset();
+    of_known_machine.rotations = true;
+    of_known_machine.reversal = false;  // of the unknowns: the calibration has its own
+    of_known_machine.smoothness.reset();
+    AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine);
+    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    return problem;
 }
 
 }  // namespace stepdiag

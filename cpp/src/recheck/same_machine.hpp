@@ -1,15 +1,14 @@
 // What readings and the calibration that predicts them must have in common. Internal: not installed.
 #pragma once
 
-#include "stepdiag/adjustment/options.hpp"
+#include "adjustment/adjustment_problem.hpp"
 
 namespace stepdiag {
 
-// Throws InvalidArgument for another chain, volume or tool, or temperatures that the two refer to differently.
-void check_same_machine(const Calibration& calibration, const Plan& plan, const Chain& chain,
-                        const Eigen::Vector3d& tool, const AdjustmentOptions& options);
-
-// The options of an adjustment as they count where the machine is known.
-AdjustmentOptions of_known_machine(AdjustmentOptions options);
+// The readings, with the options of an adjustment as they count where the machine is known. Throws InvalidArgument for
+// another chain, volume or tool, for temperatures that the two refer to differently, and where all readings are lost.
+AdjustmentProblem problem_of_known_machine(const Calibration& calibration, const Measurement& measurement,
+                                           const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                                           const HeadCalibrations& heads, const AdjustmentOptions& options);
 
 }  // namespace stepdiag

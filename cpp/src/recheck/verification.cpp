@@ -108,9 +108,7 @@ Verification verify(const Calibration& calibration, const Measurement& measureme
     if (!sent.empty() && sent.size() != measurement.size())
         throw InvalidArgument("sent: expected a shift for each of " + std::to_string(measurement.size()) +
                               " rows, got " + std::to_string(sent.size()));
-    check_same_machine(calibration, plan, chain, tool, options);
-    AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
-    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    AdjustmentProblem problem = problem_of_known_machine(calibration, measurement, plan, chain, tool, heads, options);
     const Baseline baseline(calibration, largest_change, read_positions(problem));
     return judge_without_wrong_readings(
         {measurement, plan, chain, tool, heads, options}, problem,

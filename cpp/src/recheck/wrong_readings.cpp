@@ -9,6 +9,10 @@
 
 namespace stepdiag {
 
+void refuse_few_readings() {
+    throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
+}
+
 std::vector<Misfit> largest_misfits(const AdjustmentProblem& problem, const Prediction& prediction, std::size_t count) {
     std::vector<Misfit> misfits;
     for (int r = 0; r < int(problem.readings().size()); ++r)

@@ -46,6 +46,8 @@ void leave_out(const std::vector<FaultClass>& faults, AdjustmentProblem& problem
 // A wrong reading that is left out, from the judgement before and after.
 Fault wrong_reading(const Run& run, const AdjustmentProblem& problem, const Misfit& before, double after, double gain);
 
+[[noreturn]] void refuse_few_readings();
+
 template <class Result>
 struct Judgement {
     Result result;
@@ -97,8 +99,7 @@ bool leave_out_one(const Run& run, AdjustmentProblem& problem, const Judge& judg
 template <class Judge>
 auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, const Judge& judge) {
     auto judged = judge(problem);
-    if (judged.fit.freedom < 1)
-        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
+    if (judged.fit.freedom < 1) refuse_few_readings();
     std::vector<FaultClass> found;
     if (judged.is_asked && !leave_out_one(run, problem, judge, judged, found)) {
         found = faults_of(run);

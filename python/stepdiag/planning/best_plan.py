@@ -297,13 +297,12 @@ class _Search:
             if seconds > aim.minutes * MINUTE:  # however good it is
                 return (math.inf, seconds)
             found = self.estimate(like)
-            smaller = replace(
-                found,
-                seconds=seconds,
-                volume=found.volume / slack,
-                largest={kind: u / slack for kind, u in found.largest.items()},
-            )
-            return (self._lacking(found), *aim.order(smaller))
+            if slack != 1.0:
+                smaller = {kind: u / slack for kind, u in found.largest.items()}
+                found = replace(found, volume=found.volume / slack, largest=smaller)
+            if seconds != found.seconds:
+                found = replace(found, seconds=seconds)
+            return (self._lacking(found), *aim.order(found))
 
         return order
 

@@ -7,8 +7,7 @@ from typing import Final
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.volume import GRID
-from stepdiag.parameters import KINDS, Kind, kind_of
-from stepdiag.planning.plan_by_time import Candidate, Evaluated, evaluate, says_more, usual
+from stepdiag.planning.plan_by_time import Candidate, Evaluated, evaluate, evaluated, says_more, usual
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run, simulate_scenario
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
@@ -33,7 +32,7 @@ class Estimates:
             if tells is None:
                 self.found[candidate] = evaluate(self.scenario, candidate, between(candidate), faults=self.faults)
             else:
-                self.found[candidate] = _evaluated(tells.known_by(candidate.lines, candidate.scale_lines))
+                self.found[candidate] = evaluated(tells.known_by(candidate.lines, candidate.scale_lines))
         return self.found[candidate]
 
     def _tells(self, candidate: Candidate, between: Callable[[Candidate], float]) -> _core.LineInformation | None:
@@ -61,12 +60,3 @@ class Estimates:
         scenario = usual(self.scenario, candidate, between)
         run = reduced_run(scenario.known, simulate_scenario(scenario))
         return scenario.known, run, adjustment_options(scenario.known, run)
-
-
-def _evaluated(known: _core.KnownByLines) -> Evaluated:
-    largest: dict[Kind, float] = {}
-    for parameter, u in known.largest.items():
-        kind = kind_of(parameter)
-        largest[kind] = max(largest.get(kind, 0.0), u)
-    ordered = {kind: largest[kind] for kind in KINDS if kind in largest}
-    return Evaluated(ordered, frozenset(known.determined), known.volume)

@@ -3,6 +3,8 @@
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +14,8 @@ from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.units import MINUTE
 
 FloatArray = npt.NDArray[np.float64]
+
+HOME: Final = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,8 @@ class OnLine:
     seconds: float  # from its first point to its last reading, that of the first point included
     readings: int
     reading: float  # s
-    first: FloatArray  # (3,) where it begins and ends, mm
-    last: FloatArray
+    first: tuple[float, ...]  # (3,) where it begins and ends, mm
+    last: tuple[float, ...]
 
 
 def on_lines(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> dict[str, OnLine]:
@@ -70,21 +74,27 @@ def on_lines(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = Fal
         way = np.concatenate([planned.positions for planned in passes])
         moving = float(times.move(np.linalg.norm(np.diff(way, axis=0), axis=1)).sum())
         set_up = times.scale_line_change if line in plan.scale_lines else times.line_change
-        found[line] = OnLine(set_up, moving + len(way) * reading, len(way), reading, way[0], way[-1])
+        ends = tuple(way[0].tolist()), tuple(way[-1].tolist())
+        found[line] = OnLine(set_up, moving + len(way) * reading, len(way), reading, *ends)
     return found
 
 
 def in_turn(lines: Iterable[OnLine], times: Times) -> tuple[float, float]:
     """Seconds from home to the last reading of lines that are measured one after another, and the mean time from a
     reading to the next one on a line."""
-    total, place = 0.0, np.zeros(3)
+    total, place = 0.0, HOME
     measuring, gaps = 0.0, 0
     for line in lines:
-        total += line.set_up + float(times.move(np.linalg.norm(line.first - place))) + line.seconds
+        total += line.set_up + _move(times, place, line.first) + line.seconds
         measuring += line.seconds - line.reading
         gaps += line.readings - 1
         place = line.last
     return total, measuring / gaps
+
+
+@lru_cache(maxsize=4096)  # a search for plans asks for the same few moves again and again
+def _move(times: Times, start: tuple[float, ...], end: tuple[float, ...]) -> float:
+    return float(times.move(np.linalg.norm(np.subtract(end, start))))
 
 
 def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> tuple[float, float]:

@@ -4,6 +4,7 @@ which of several plans is the best one for an aim."""
 import itertools
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -13,15 +14,22 @@ import numpy.typing as npt
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
-from stepdiag.calibration.volume import ONE_SIDED, variances_in_volume
+from stepdiag.calibration.volume import GRID, ONE_SIDED, variances_in_volume
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, TruthKeys
 from stepdiag.config.toml_text import located
-from stepdiag.parameters import Kind
+from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.planning.fault_control import distinguishes_all
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import extents, not_measured
-from stepdiag.scenario.description import Scenario, adjusted_numbers, simulate_scenario
+from stepdiag.scenario.description import (
+    Scenario,
+    adjusted_numbers,
+    adjustment_options,
+    reduced_run,
+    simulate_scenario,
+)
+from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known, runs_of
 from stepdiag.scenario.truth import Truth, truth_of
 from stepdiag.units import MICROMETRE, MICRORADIAN, MINUTE
@@ -339,6 +347,9 @@ def evaluate(scenario: Scenario, candidate: Candidate, between: float, *, faults
     try:
         planned = usual(scenario, candidate, between)
         more = says_more(scenario.known)
+        if not faults and not more:
+            with suppress(InvalidArgument):  # of what the adjustment also does, or has a better word for
+                return _known_by_run(planned)
         controls = None
         if faults or not more:
             run = simulate_scenario(planned)
@@ -354,6 +365,25 @@ def evaluate(scenario: Scenario, candidate: Candidate, between: float, *, faults
         return Evaluated(largest, determined, variances_in_volume(calibration), controls)
     except InvalidArgument as error:
         return Evaluated({}, trouble=str(error))
+
+
+def _known_by_run(planned: Scenario) -> Evaluated:
+    """What the adjustment of its run knows, without its tests of the readings."""
+    known = planned.known
+    run = reduced_run(known, simulate_scenario(planned))
+    options = adjustment_options(known, run)
+    return evaluated(
+        _core.known_by_run(run, known.plan, of_run(known.heads), known.chain, known.tool, options, grid=GRID)
+    )
+
+
+def evaluated(known: _core.KnownByLines) -> Evaluated:
+    largest: dict[Kind, float] = {}
+    for parameter, u in known.largest.items():
+        kind = kind_of(parameter)
+        largest[kind] = max(largest.get(kind, 0.0), u)
+    ordered = {kind: largest[kind] for kind in KINDS if kind in largest}
+    return Evaluated(ordered, frozenset(known.determined), known.volume)
 
 
 def usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario:

@@ -10,14 +10,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Calibration, ChangeTerm, InvalidArgument, Plan
+from stepdiag._core import Calibration, ChangesSeen, ChangeTerm, InvalidArgument, Plan
 from stepdiag.calibration.volume import variances_in_volume
 from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import not_measured
 from stepdiag.planning.plan_by_time import ALIKE, Candidate
-from stepdiag.rechecking.recheck import hidden_by, moves_by, recheck
+from stepdiag.rechecking.recheck import changes_seen, hidden_by, moves_by
 from stepdiag.rechecking.verification import ALPHA
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.known import runs_of
@@ -157,11 +157,10 @@ def powers(
 ) -> list[Power]:
     """Of all candidates, the fastest first. `progress` receives how many of how many are done."""
     everything = candidates(scenario, baseline, minutes)
+    seen = _SeenByLines(scenario, baseline, [candidate for _, candidate in everything])
     result: list[Power] = []
-    moves: npt.NDArray[np.float64] | None = None
     for done, (seconds, candidate) in enumerate(everything, 1):
-        one, moves = power_of(scenario, baseline, candidate, seconds, alpha=alpha, moves=moves)
-        result.append(one)
+        result.append(seen.power(candidate, seconds, alpha))
         if progress is not None:
             progress(done, len(everything))
     if all(one.trouble for one in result):
@@ -169,39 +168,44 @@ def powers(
     return result
 
 
-def power_of(
-    scenario: Scenario,
-    baseline: Calibration,
-    candidate: Candidate,
-    seconds: float,
-    *,
-    alpha: float = ALPHA,
-    moves: npt.NDArray[np.float64] | None = None,
-) -> tuple[Power, npt.NDArray[np.float64] | None]:
-    """By readings without noise of a machine as the baseline has it. `moves`: as `moves_by`, which are the same for all
-    plans; they are given back."""
-    planned = not_measured(
-        scenario.known,
-        {
-            "lines": candidate.lines,
-            "scale_lines": candidate.scale_lines,
-            "steps": candidate.steps,
-            "repeats": candidate.repeats,
-            "check_points": 0,
-        },
-    )
-    try:
-        run = simulate_scenario(Scenario(planned, truth_of(TruthKeys(), {}, planned)), baseline.to_error_map())
-        found = recheck(baseline, planned, run, update=False)
-    except InvalidArgument as error:
-        return Power(candidate, seconds, trouble=str(error)), moves
-    smallest = found.smallest_changes_seen(alpha=alpha, power=POWER)
-    if moves is None:
-        moves = moves_by(baseline, found.shape)
-    gains = tuple(np.sqrt((moves**2).sum(axis=1).max(axis=0)).tolist())
-    return Power(
-        candidate, seconds, found.terms, tuple(map(float, smallest)), gains, hidden_by(moves, found.covariance)
-    ), moves
+class _SeenByLines:
+    """What each line shows of changes: of all lines of plans with the same steps together, where one run can have
+    them."""
+
+    def __init__(self, scenario: Scenario, baseline: Calibration, plans: Sequence[Candidate]) -> None:
+        self.scenario, self.baseline, self.plans = scenario, baseline, plans
+        self.by_steps: dict[int, ChangesSeen | None] = {}
+        self.moves: npt.NDArray[np.float64] | None = None  # the same for all plans
+
+    def power(self, plan: Candidate, seconds: float, alpha: float) -> Power:
+        try:
+            changes = self._of_all_lines(plan.steps) or self._of(plan.lines, plan.scale_lines, plan.steps)
+            seen = changes.by(plan.lines, plan.scale_lines, repeats=plan.repeats, alpha=alpha, power=POWER)
+        except InvalidArgument as error:
+            return Power(plan, seconds, trouble=str(error))
+        if self.moves is None:
+            self.moves = moves_by(self.baseline, changes.shape)
+        gains = tuple(np.sqrt((self.moves**2).sum(axis=1).max(axis=0)).tolist())
+        hidden = hidden_by(self.moves, seen.covariance)
+        return Power(plan, seconds, changes.terms, tuple(map(float, seen.smallest)), gains, hidden)
+
+    def _of_all_lines(self, steps: int) -> ChangesSeen | None:
+        if steps not in self.by_steps:
+            plans = [plan for plan in self.plans if plan.steps == steps]
+            lines = dict.fromkeys(line for plan in plans for line in plan.lines)
+            scale_lines = dict.fromkeys(line for plan in plans for line in plan.scale_lines)
+            try:
+                self.by_steps[steps] = self._of(tuple(lines), tuple(scale_lines), steps)
+            except InvalidArgument:  # of a line that not all plans have
+                self.by_steps[steps] = None
+        return self.by_steps[steps]
+
+    def _of(self, lines: Sequence[str], scale_lines: Sequence[str], steps: int) -> ChangesSeen:
+        """By readings without noise of a machine as the baseline has it."""
+        plan = {"lines": lines, "scale_lines": scale_lines, "steps": steps, "repeats": 1, "check_points": 0}
+        known = not_measured(self.scenario.known, plan)
+        run = simulate_scenario(Scenario(known, truth_of(TruthKeys(), {}, known)), self.baseline.to_error_map())
+        return changes_seen(self.baseline, known, run)
 
 
 def choose(found: Sequence[Power], minutes: float, limit: float) -> Power | None:

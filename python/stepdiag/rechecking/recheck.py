@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag._core import Calibration, Measurement, Recheck
+from stepdiag._core import Calibration, ChangesSeen, Measurement, Recheck
 from stepdiag.calibration.volume import GRID, volume_grid
 from stepdiag.rechecking.verification import with_stated_between_nodes
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run
@@ -59,6 +59,21 @@ def recheck(
         adjustment_options(known),
         known.change,
         update,
+    )
+
+
+def changes_seen(baseline: Calibration, known: Known, measurement: Measurement) -> ChangesSeen:
+    """Which changes `recheck` would see in runs of some of these lines: `measurement` has readings without noise of a
+    machine as the baseline has it, each line once."""
+    return _core.ChangesSeen(
+        with_stated_between_nodes(baseline, known),
+        reduced_run(known, measurement),
+        known.plan,
+        of_run(known.heads),
+        known.chain,
+        known.tool,
+        adjustment_options(known),
+        known.change,
     )
 
 

@@ -26,6 +26,7 @@ from stepdiag.planning.plan_by_time import (
     choose,
     complete,
     distinguishing,
+    evaluate,
     front,
     outcome,
     own_candidate,
@@ -105,6 +106,35 @@ def test_plan_of_the_scenario_has_the_uncertainties_of_its_run() -> None:
     assert found.largest == pytest.approx({kind: value for kind, (value, _) in expected.items()}, rel=1e-9)
     assert len(found.determined) == 21
     assert found.spacing == 16.0
+
+
+@pytest.mark.parametrize(
+    ("lines", "scale_lines"),
+    [
+        (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p")),
+        (("ppp", "npp", "pnp", "nnp"), ()),
+        (("ppp", "npp"), ("00p",)),
+        (("pp0", "np0"), ("p00",)),  # Z does not move
+        (("pp0", "np0", "p0p", "n0p", "0pp", "0np"), ()),
+    ],
+)
+@pytest.mark.parametrize("backward", [False, True])
+def test_without_tests_of_the_readings_a_plan_gives_the_same(
+    lines: tuple[str, ...], scale_lines: tuple[str, ...], backward: bool
+) -> None:
+    """Faults take the adjustment with its tests and the covariance of all values."""
+    scenario = parse_scenario(SCENARIO + FEW)
+    plan = replace(own_candidate(scenario.known), lines=lines, scale_lines=scale_lines, backward=backward)
+    quick, whole = (evaluate(scenario, plan, 5.0, faults=faults) for faults in (False, True))
+    assert quick.trouble == whole.trouble == ""
+    assert quick.determined == whole.determined
+    assert quick.largest == pytest.approx(whole.largest, rel=1e-6)
+    assert quick.volume == pytest.approx(whole.volume, rel=1e-4)
+    assert quick.variances is not None
+    assert whole.variances is not None
+    # The calibration does not say an error where it is 0 whatever is not determined, as at home.
+    is_said = np.isfinite(whole.variances)
+    np.testing.assert_allclose(quick.variances[is_said], whole.variances[is_said], rtol=1e-4)
 
 
 def test_uncertainties_are_those_of_a_machine_with_errors() -> None:

@@ -11,7 +11,13 @@ from scipy.stats import chi2, ncx2
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.planning.recheck_plans import Power, candidates, choose, common_steps, front, own_limit, powers
+from stepdiag.config.scenario_keys import TruthKeys
+from stepdiag.planning.observation import not_measured
+from stepdiag.planning.recheck_plans import POWER, Power, candidates, choose, common_steps, front, own_limit, powers
+from stepdiag.rechecking.recheck import Judged
+from stepdiag.rechecking.verification import ALPHA
+from stepdiag.scenario.description import Scenario, parse_scenario, simulate_scenario
+from stepdiag.scenario.truth import truth_of
 
 SCENARIO = """
 [volume]
@@ -91,6 +97,34 @@ def test_shape_is_what_terms_add_to_the_entries(scenario: sd.Scenario, baseline:
             share = 0.0 if position is None else position / baseline.volume["XYZ".index(term.parameter[2])]
             expected = {"scale": position, "bow": 4 * share * (1 - share), "slope": share, "squareness": 1.0}
             assert value == pytest.approx(expected[term.kind] if parameter == term.parameter else 0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("more", ["", "backward = true\n", "one_setup_per_line = true\n"])
+def test_plans_show_what_a_recheck_of_their_readings_does(folder: Path, baseline: sd.Calibration, more: str) -> None:
+    section = "[adjustment]\n" if "one" in more else "[plan]\n"
+    scenario = parse_scenario(SCENARIO.replace(section, section + more))
+    for one in powers(scenario, baseline, MINUTES)[::5]:
+        plan = one.candidate
+        changes = {
+            "lines": plan.lines,
+            "scale_lines": plan.scale_lines,
+            "steps": plan.steps,
+            "repeats": plan.repeats,
+            "check_points": 0,
+        }
+        planned = not_measured(scenario.known, changes)
+        run = simulate_scenario(Scenario(planned, truth_of(TruthKeys(), {}, planned)), baseline.to_error_map())
+        if one.trouble:
+            refused(sd.recheck, baseline, planned, run, names=one.trouble)
+            continue
+        found = sd.recheck(baseline, planned, run)
+        moved = np.array(one.gains) > 0.0
+        # A laser's angle that the readings hardly tell is where a recheck happens to end.
+        np.testing.assert_allclose(
+            np.array(one.smallest)[moved], found.smallest_changes_seen(power=POWER)[moved], rtol=1e-3
+        )
+        judged = Judged(found, baseline, ALPHA)
+        assert one.hidden == pytest.approx(judged.hidden, rel=1e-3)
 
 
 def test_points_of_plans_are_nodes_of_the_baseline(scenario: sd.Scenario, baseline: sd.Calibration) -> None:

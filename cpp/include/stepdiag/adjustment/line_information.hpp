@@ -32,6 +32,12 @@ struct KnownByLines {
     Eigen::VectorXd volume;
 };
 
+// What adjust() knows by a run without noise, without its tests of the readings: a tenth of its time with the
+// covariance of all values. `grid`: positions of each axis in the grid of KnownByLines, at least 2. Throws
+// InvalidArgument for what LineInformation refuses, and where nothing is determined.
+KnownByLines known_by_run(const Measurement& run, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                          const HeadCalibrations& heads, const AdjustmentOptions& options, int grid);
+
 // The normal equations of each line without the unknowns of its set-up, which no other line has. Those of some lines
 // are sums of theirs, so that a choice of lines takes one factor and its inverse: a tenth of the time of an adjustment.
 // What is determined is the same, uncertainties are within a hundredth or so: a set-up is taken to be where is usual
@@ -49,7 +55,7 @@ public:
     void add(const Measurement& run, const Plan& plan, const HeadCalibrations& heads, const AdjustmentOptions& options);
 
     // Of the lines that are chosen, each of which one of the runs has; else throws InvalidArgument.
-    KnownByLines known_by(const std::vector<ChosenLine>& lines) const;
+    KnownByLines known_by(const std::vector<ChosenLine>& lines);
 
 private:
     struct State;

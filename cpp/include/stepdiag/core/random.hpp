@@ -14,6 +14,7 @@ enum class RandomStream : std::uint32_t {
     error_map = 2,
     verification = 3,
     variance_components = 4,
+    null_vectors = 5,
     camera_shot_noise = 16,
     camera_read_noise = 17,
     position_device = 18,
