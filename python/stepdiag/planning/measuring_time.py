@@ -15,7 +15,9 @@ from stepdiag.units import MINUTE
 
 FloatArray = npt.NDArray[np.float64]
 
-HOME: Final = (0.0, 0.0, 0.0)
+Place = tuple[float, ...]  # (3,) mm
+
+HOME: Final[Place] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,8 @@ class OnLine:
     seconds: float  # from its first point to its last reading, that of the first point included
     readings: int
     reading: float  # s
-    first: tuple[float, ...]  # (3,) where it begins and ends, mm
-    last: tuple[float, ...]
+    first: Place  # where it begins and ends
+    last: Place
 
 
 def on_lines(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> dict[str, OnLine]:
@@ -93,7 +95,7 @@ def in_turn(lines: Iterable[OnLine], times: Times) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=4096)  # a search for plans asks for the same few moves again and again
-def _move(times: Times, start: tuple[float, ...], end: tuple[float, ...]) -> float:
+def _move(times: Times, start: Place, end: Place) -> float:
     return float(times.move(np.linalg.norm(np.subtract(end, start))))
 
 
