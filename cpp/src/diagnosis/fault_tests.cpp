@@ -245,32 +245,10 @@ double FaultTests::controlled(int hypothesis, const Eigen::VectorXd& effect) con
     return q < controlled_share * square(hypothesis) ? 0.0 : q;
 }
 
-std::vector<double> FaultTests::correlations(int hypothesis, const Eigen::VectorXd& effect) const {
-    const std::vector<FaultHypothesis>& all = hypotheses_->all();
-    std::vector<double> correlations(all.size(), 0.0);
-    const double own = controlled(hypothesis, effect);
-    if (own == 0.0) return correlations;
-    Eigen::VectorXd shown = Eigen::VectorXd::Zero(weight_.size());  // R c
-    for (const int r : hypotheses_->readings(all[hypothesis])) shown[r] = weight(all[hypothesis], r);
-    for (Eigen::Index r = 0; r < weight_.size(); ++r)
-        if (weight_[r] > 0.0) shown[r] -= equations_->row(int(r)).product(effect);
-    // Of the readings from each place of a sequence to its end.
-    std::vector<std::vector<double>> from;
-    for (const ReadingSequence& sequence : hypotheses_->sequences()) {
-        auto& sums = from.emplace_back(sequence.readings.size() + 1, 0.0);
-        for (std::size_t i = sequence.readings.size(); i-- > 0;) {
-            const int r = sequence.readings[i];
-            sums[i] = sums[i + 1] + weight_[r] * shown[r];
-        }
-    }
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        if (c_r_c_[k] == 0.0) continue;
-        double product = 0.0;
-        if (all[k].kind == FaultKind::slip) product = from[all[k].sequence][all[k].first];
-        else
-            for (const int r : hypotheses_->readings(all[k])) product += weight(all[k], r) * shown[r];
-        correlations[k] = product / std::sqrt(own * c_r_c_[k]);
-    }
+std::vector<double> FaultTests::correlations(int hypothesis) const {
+    std::vector<double> correlations(hypotheses_->all().size());
+    each_correlation(&hypothesis, 1, effects(&hypothesis, 1),
+                     [&](int h, const BorderedFactor::OfSides& found) { correlations[h] = found[0]; });
     return correlations;
 }
 

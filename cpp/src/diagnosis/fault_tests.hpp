@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -105,9 +106,11 @@ public:
     // What each fault of size 1 does to values: `use(hypothesis, OfSides)`. `y`: N^-1 of their forms.
     template <class Use>
     void each_effect(const BorderedFactor::Sides& y, const Use& use) const;
-    // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two.
-    std::vector<double> correlations(int hypothesis) const { return correlations(hypothesis, effect(hypothesis)); }
-    std::vector<double> correlations(int hypothesis, const Eigen::VectorXd& effect) const;  // that has this effect
+    // Of up to BorderedFactor::sides hypotheses that have these effects with each one: `use(hypothesis, OfSides)`; 0
+    // where nothing controls one of the two.
+    template <class Use>
+    void each_correlation(const int* hypotheses, int count, const BorderedFactor::Sides& effects, const Use& use) const;
+    std::vector<double> correlations(int hypothesis) const;  // of one with each
     double correlation(int h, int k) const { return correlations(h)[k]; }
 
 private:
@@ -118,6 +121,9 @@ private:
     BorderedFactor::Sides gradients(const int* hypotheses, int count) const;
     void sum_readings();
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
+    // c of each hypothesis times what is shown by the readings, a row each: `use(hypothesis, OfSides)`.
+    template <class Use>
+    void each_product(const BorderedFactor::Sides& shown, const Use& use) const;
     bool are_exact(std::vector<int> hypotheses, const std::vector<double>& found);
     void solve_for(const std::vector<int>& hypotheses);
     void set(int hypothesis, double c_r_c);
@@ -134,22 +140,43 @@ private:
 
 template <class Use>
 void FaultTests::each_effect(const BorderedFactor::Sides& y, const Use& use) const {
+    each_product(equations_->images(y), use);
+}
+
+template <class Use>
+void FaultTests::each_correlation(const int* hypotheses, int count, const BorderedFactor::Sides& effects,
+                                  const Use& use) const {
+    using OfSides = BorderedFactor::OfSides;
+    BorderedFactor::Sides shown = -equations_->images(effects);  // R c
+    OfSides scale = OfSides::Zero();
+    for (int k = 0; k < count; ++k) {
+        const FaultHypothesis& h = hypotheses_->all()[hypotheses[k]];
+        for (const int r : hypotheses_->readings(h)) shown(r, k) += weight(h, r);
+        if (c_r_c_[hypotheses[k]] > 0.0) scale[k] = 1.0 / std::sqrt(c_r_c_[hypotheses[k]]);
+    }
+    each_product(shown, [&](int h, const OfSides& product) {
+        const double own = c_r_c_[h] > 0.0 ? 1.0 / std::sqrt(c_r_c_[h]) : 0.0;
+        use(h, OfSides(own * product.cwiseProduct(scale)));
+    });
+}
+
+template <class Use>
+void FaultTests::each_product(const BorderedFactor::Sides& shown, const Use& use) const {
     using OfSides = BorderedFactor::OfSides;
     const std::vector<FaultHypothesis>& all = hypotheses_->all();
-    const BorderedFactor::Sides image = equations_->images(y);
     std::vector<OfSides> from;  // of a sequence from each place to its end
     for (std::size_t h = 0; h < all.size();) {
         const int sequence = all[h].sequence;
         const std::vector<int>& readings = hypotheses_->sequences()[sequence].readings;
         from.assign(readings.size() + 1, OfSides::Zero());
         for (std::size_t i = readings.size(); i-- > 0;)
-            from[i].noalias() = from[i + 1] + weight_[readings[i]] * image.row(readings[i]);
+            from[i].noalias() = from[i + 1] + weight_[readings[i]] * shown.row(readings[i]);
         for (; h < all.size() && all[h].sequence == sequence; ++h) {
-            OfSides effect = OfSides::Zero();
-            if (all[h].kind == FaultKind::slip) effect = from[all[h].first];
+            OfSides product = OfSides::Zero();
+            if (all[h].kind == FaultKind::slip) product = from[all[h].first];
             else
-                for (const int r : hypotheses_->readings(all[h])) effect += weight(all[h], r) * image.row(r);
-            use(int(h), effect);
+                for (const int r : hypotheses_->readings(all[h])) product += weight(all[h], r) * shown.row(r);
+            use(int(h), product);
         }
     }
 }

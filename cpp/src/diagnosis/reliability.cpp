@@ -1,6 +1,7 @@
 #include "diagnosis/reliability.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -53,6 +54,12 @@ std::string channel_of(const AdjustmentProblem& problem, const FaultHypotheses& 
     return name.front() == 'd' ? "distance" : name.front() == 's' ? "spot" : "tilt";
 }
 
+template <class Function>
+void for_sixteens(const std::vector<int>& list, const Function& function) {
+    for (std::size_t i = 0; i < list.size(); i += BorderedFactor::sides)
+        function(list.data() + i, int(std::min<std::size_t>(BorderedFactor::sides, list.size() - i)));
+}
+
 // What a fault of size 1 does to the calibrated values, kept.
 class Effects {
 public:
@@ -99,36 +106,53 @@ public:
             FaultControl& control = controls.emplace_back();
             control.channel = place.first;
             control.kind = place.second;
-            for (std::size_t i = 0; i < group.size(); i += step) look_at(group[i], control);
+            std::vector<int> some;
+            for (std::size_t i = 0; i < group.size(); i += step) some.push_back(group[i]);
+            for_sixteens(some, [&](const int* of, int count) { look_at(of, count, control); });
         }
         return controls;
     }
 
 private:
-    void look_at(int h, FaultControl& control) {
-        const Eigen::VectorXd effect = tests_.effect(h);
-        const Eigen::VectorXd& changes = effects_.add(h, effect);
+    struct Twin {
+        int hypothesis;
+        double correlation;
+    };
+
+    void look_at(const int* some, int count, FaultControl& control) {
+        const BorderedFactor::Sides effects = tests_.effects(some, count);
+        std::array<double, BorderedFactor::sides> nearest{};
+        std::array<std::vector<Twin>, BorderedFactor::sides> twins;
+        tests_.each_correlation(some, count, effects, [&](int h, const BorderedFactor::OfSides& correlation) {
+            for (int k = 0; k < count; ++k) {
+                if (h == some[k]) continue;
+                if (std::abs(correlation[k]) < twin) nearest[k] = std::max(nearest[k], std::abs(correlation[k]));
+                else twins[k].push_back({h, correlation[k]});
+            }
+        });
+        for (int k = 0; k < count; ++k) {
+            const Eigen::VectorXd& changes = effects_.add(some[k], effects.col(k));
+            if (std::isinf(tests_.scores()[some[k]].standard_uncertainty)) note_uncontrolled(some[k], changes, control);
+            else note_controlled(some[k], changes, nearest[k], twins[k], control);
+        }
+    }
+
+    // `nearest`: the largest correlation with a fault that is no twin.
+    void note_controlled(int h, const Eigen::VectorXd& changes, double nearest, const std::vector<Twin>& twins,
+                         FaultControl& control) {
         const double u = tests_.scores()[h].standard_uncertainty;
         const double size_found = thresholds.found_with_99_percent * noise_ * u;
-        if (std::isinf(u)) return note_uncontrolled(h, changes, control);
         ++control.count;
         control.found_from = std::max(control.found_from, size_found);
         for (std::size_t i = 0; i < values_.size(); ++i) {
             double& hidden = (control.*families[values_[i].family]).hidden;
             hidden = std::max(hidden, size_found * std::abs(changes[Eigen::Index(i)]));
         }
-        const std::vector<double> correlations = tests_.correlations(h, effect);
-        double nearest = 0.0;
         bool has_twin = false;
-        for (int k = 0; k < int(correlations.size()); ++k) {
-            if (k == h) continue;
-            if (std::abs(correlations[k]) < twin) {
-                nearest = std::max(nearest, std::abs(correlations[k]));
-                continue;
-            }
+        for (const Twin& twin : twins) {
             // The size that the twin would be found with.
-            const double size = correlations[k] * tests_.scores()[k].standard_uncertainty / u;
-            const Eigen::VectorXd difference = changes - size * effects_.of(k);
+            const double size = twin.correlation * tests_.scores()[twin.hypothesis].standard_uncertainty / u;
+            const Eigen::VectorXd difference = changes - size * effects_.of(twin.hypothesis);
             if (!matters(h, difference)) continue;
             has_twin = true;
             for (std::size_t i = 0; i < values_.size(); ++i) {
@@ -305,12 +329,6 @@ private:
                 }
             });
         }
-    }
-
-    template <class Function>
-    static void for_sixteens(const std::vector<int>& list, const Function& function) {
-        for (std::size_t i = 0; i < list.size(); i += BorderedFactor::sides)
-            function(list.data() + i, int(std::min<std::size_t>(BorderedFactor::sides, list.size() - i)));
     }
 
     const GaussNewton& solver_;
