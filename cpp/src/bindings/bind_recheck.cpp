@@ -141,7 +141,6 @@ SeenChanges seen_by(ChangesSeen& changes, const std::vector<std::string>& lines,
     std::vector<ChosenLine> chosen;
     for (const std::string& line : lines) chosen.push_back({line, false});
     for (const std::string& line : scale_lines) chosen.push_back({line, true});
-    const py::gil_scoped_release release;
     return changes.by(chosen, repeats, alpha, power);
 }
 

@@ -126,6 +126,7 @@ const Eigen::MatrixXd& ChangesSeen::shape() const { return state_->shape; }
 // adds up.
 SeenChanges ChangesSeen::by(const std::vector<ChosenLine>& lines, int repeats, double alpha, double power) {
     State& state = *state_;
+    if (lines.empty()) throw InvalidArgument("lines: expected at least one");
     if (repeats < 1) throw InvalidArgument("repeats: expected at least 1, got " + std::to_string(repeats));
     const ToldByReadings& told = state.told_with(state.one_setup_per_line ? 1.0 / repeats : 1.0);
     std::vector<int> chosen;

@@ -14,7 +14,7 @@ from stepdiag.cli import main
 from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.planning.observation import not_measured
 from stepdiag.planning.recheck_plans import POWER, Power, candidates, choose, common_steps, front, own_limit, powers
-from stepdiag.rechecking.recheck import Judged
+from stepdiag.rechecking.recheck import Judged, changes_seen
 from stepdiag.rechecking.verification import ALPHA
 from stepdiag.scenario.description import Scenario, parse_scenario, simulate_scenario
 from stepdiag.scenario.truth import truth_of
@@ -125,6 +125,15 @@ def test_plans_show_what_a_recheck_of_their_readings_does(folder: Path, baseline
         )
         judged = Judged(found, baseline, ALPHA)
         assert one.hidden == pytest.approx(judged.hidden, rel=1e-3)
+
+
+def test_lines_that_no_run_has_are_refused(scenario: sd.Scenario, baseline: sd.Calibration) -> None:
+    planned = not_measured(scenario.known, {"repeats": 1})
+    seen = changes_seen(baseline, planned, sd.simulate(scenario))
+    refused(seen.by, ["pp0"], [], names='the run has no line "pp0"')
+    refused(seen.by, [], [], names="lines: expected at least one")
+    refused(seen.by, ["ppp"], [], repeats=0, names="repeats: expected at least 1, got 0")
+    refused(seen.by, ["ppp"], [], alpha=0.5, power=0.4, names="0 < alpha < power < 1")
 
 
 def test_points_of_plans_are_nodes_of_the_baseline(scenario: sd.Scenario, baseline: sd.Calibration) -> None:
