@@ -4333,9 +4333,9 @@ def read_signals(head: Head, *, distance: typing.SupportsFloat | typing.Supports
     """
     The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.
     """
-def recheck(baseline: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, priors: ChangePriors = ..., update: bool = True) -> Recheck:
+def recheck(baseline: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, priors: ChangePriors = ...) -> Recheck:
     """
-    Whether the machine has changed since its calibration `baseline`, by readings of a short run; plan, head and options (AdjustmentOptions) are those of the readings. update=False: without `updated`, which takes less time. Raises InvalidArgument as verify does.
+    Whether the machine has changed since its calibration `baseline`, by readings of a short run; plan, head and options (AdjustmentOptions) are those of the readings. Raises InvalidArgument as verify does.
     """
 def run_leaves(model: SampleModel, bins: Bins, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> PartialStatistics:
     """

@@ -51,13 +51,13 @@ VerificationOfRun verify_run(const Calibration& calibration, const Measurement& 
 
 Recheck recheck_run(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const HeadLike& head,
                     const ChainLike& chain, const ArrayLike& tool, const std::optional<AdjustmentOptions>& given,
-                    const ChangePriors& priors, bool update) {
+                    const ChangePriors& priors) {
     const AdjustmentOptions options = given.value_or(AdjustmentOptions{});
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
     const py::gil_scoped_release release;
-    return recheck(baseline, measurement, plan, kinematics, offset, heads, options, priors, update);
+    return recheck(baseline, measurement, plan, kinematics, offset, heads, options, priors);
 }
 
 DoubleArray seen(const Recheck& recheck, double alpha, double power) {
@@ -129,11 +129,9 @@ static void bind_recheck_of_run(py::module_& m) {
     m.def(
         "recheck", &recheck_run, py::arg("baseline"), py::arg("measurement"), py::arg("plan"), py::arg("head"),
         py::arg("chain"), py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
-        py::arg("priors") = ChangePriors{}, py::arg("update") = true,
+        py::arg("priors") = ChangePriors{},
         "Whether the machine has changed since its calibration `baseline`, by readings of a short run; plan, head and "
-        "options (AdjustmentOptions) are those of the readings. update=False: without `updated`, which takes less "
-        "time. Raises InvalidArgument as "
-        "verify does.");
+        "options (AdjustmentOptions) are those of the readings. Raises InvalidArgument as verify does.");
 }
 
 SeenChanges seen_by(ChangesSeen& changes, const std::vector<std::string>& lines,

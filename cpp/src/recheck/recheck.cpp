@@ -49,7 +49,7 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     return updated;
 }
 
-Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& changing, bool update) {
+Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
     const auto count = Eigen::Index(changing.changes().size());
     const Eigen::Index begin = changing.root().cols() - count;
 
@@ -58,17 +58,7 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
     const ToldChanges told(changed.information(begin, count));
     const Eigen::VectorXd found = estimate(told, changed.values().segment(begin, count));
 
-    Recheck result{0.0,
-                   0,
-                   1.0,
-                   0.0,
-                   0,
-                   1.0,
-                   changing.changes(),
-                   {},
-                   {},
-                   {},
-                   update ? with_change(changing, changed) : changing.calibration()};
+    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, {}, with_change(changing, changed)};
     result.chi_square = found.cwiseAbs2().dot(told.information);
     result.degrees_of_freedom = int(count - told.first);
     if (result.degrees_of_freedom > 0)
@@ -119,12 +109,11 @@ std::string name(ChangeKind kind) {
 
 Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options,
-                const ChangePriors& priors, bool update) {
+                const ChangePriors& priors) {
     AdjustmentProblem problem = problem_of_known_machine(baseline, measurement, plan, chain, tool, heads, options);
     const Baseline changing(baseline, priors, read_positions(problem));
-    return judge_without_wrong_readings(
-        {measurement, plan, chain, tool, heads, options}, problem,
-        [&](const AdjustmentProblem& rest) { return rechecked(rest, changing, update); });
+    return judge_without_wrong_readings({measurement, plan, chain, tool, heads, options}, problem,
+                                        [&](const AdjustmentProblem& rest) { return rechecked(rest, changing); });
 }
 
 }  // namespace stepdiag

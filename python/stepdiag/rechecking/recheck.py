@@ -31,9 +31,7 @@ CHANGE_UNITS: Final = {
 
 
 @checked
-def recheck(
-    baseline: Calibration, scenario: Scenario | Known, measurement: Measurement, *, update: bool = True
-) -> Recheck:
+def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Recheck:
     """Test whether a machine has changed since its calibration, and estimate the change.
 
     The machine is the baseline plus a change with low-order terms (`[change]` of the scenario). Both
@@ -43,7 +41,6 @@ def recheck(
         baseline: the calibration, with covariance and all 21 parameters (`evaluate -o FILE.nc`).
         scenario: plan, head, uncertainties, `[temperature]` and `[change]` of the readings.
         measurement: readings of a short run. The baseline must not be made from them.
-        update: otherwise `updated` is the baseline as it was, which takes less time.
 
     Raises:
         InvalidArgument: the baseline cannot predict these readings, or they do not fit the plan.
@@ -58,7 +55,6 @@ def recheck(
         known.tool,
         adjustment_options(known),
         known.change,
-        update,
     )
 
 

@@ -78,10 +78,10 @@ struct Recheck {
 };
 
 // As verify() (recheck/verification.hpp), which says what counts of `options` and what is refused; and for priors that
-// are negative or all 0. `update`: otherwise `updated` is the baseline as it was, which takes less time.
+// are negative or all 0.
 Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options = {},
-                const ChangePriors& priors = {}, bool update = true);
+                const ChangePriors& priors = {});
 
 // By term, in the unit of its prior: the smallest change, of this term alone, that such readings show with a
 // probability of `power` where an unchanged machine is said to have changed with the probability `alpha`; infinite
