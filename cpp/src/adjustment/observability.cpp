@@ -13,9 +13,9 @@ namespace {
 // A null vector touches a sum of unknowns where it changes it by more than this part of what unknowns of that size may:
 // well above rounding (1e-16 times the square of the condition), well below the least share of a slope, 1/steps.
 constexpr double touching = 1e-5;
-// So many null vectors are looked at one by one. What more of them touch, a few sums of all with random weights touch,
-// and with as many sums as there are slopes and more these span what the slopes do (N. Halko, P. G. Martinsson and J.
-// A. Tropp, SIAM Review 53 (2011) 217): the time is proportional to the number of steps, not to its square.
+// So many null vectors are looked at one by one. What more of them touch, a few sums of all with random weights touch:
+// the time is then proportional to the number of steps, not to its square (the idea is that of N. Halko, P. G.
+// Martinsson and J. A. Tropp, SIAM Review 53 (2011) 217).
 constexpr Eigen::Index few_vectors = 256, sums = 4 * BorderedFactor::sides;
 
 bool touches(const Eigen::VectorXd& vector, const LinearForm& form, const Eigen::VectorXd& units, double largest) {

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "adjustment/bordered_band.hpp"
-#include "adjustment/gauss_newton.hpp"
 #include "recheck/prediction.hpp"
 #include "recheck/same_machine.hpp"
 #include "recheck/told_changes.hpp"
@@ -158,7 +157,7 @@ SeenChanges ChangesSeen::by(const std::vector<ChosenLine>& lines, int repeats, d
     }
     matrix *= double(repeats);
     matrix.diagonal().array() += 1.0;
-    const BorderedFactor factor(dense_band(matrix, int(rows % BorderedBand::block_size)), rank_threshold);
+    const BorderedFactor factor(dense_band(matrix, int(rows % BorderedBand::block_size)), 0.0);  // none is held
     MatrixXd information(state.tested, state.tested);
     for (Index begin = 0; begin < state.tested; begin += BorderedFactor::sides) {
         const Index count = std::min<Index>(BorderedFactor::sides, state.tested - begin);

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -45,23 +45,17 @@ def recheck(baseline: Calibration, scenario: Scenario | Known, measurement: Meas
     Raises:
         InvalidArgument: the baseline cannot predict these readings, or they do not fit the plan.
     """
-    known = scenario.known
-    return _core.recheck(
-        with_stated_between_nodes(baseline, known),
-        reduced_run(known, measurement),
-        known.plan,
-        of_run(known.heads),
-        known.chain,
-        known.tool,
-        adjustment_options(known),
-        known.change,
-    )
+    return _core.recheck(*_arguments(baseline, scenario.known, measurement))
 
 
 def changes_seen(baseline: Calibration, known: Known, measurement: Measurement) -> ChangesSeen:
     """Which changes `recheck` would see in runs of some of these lines: `measurement` has readings without noise of a
     machine as the baseline has it, each line once."""
-    return _core.ChangesSeen(
+    return _core.ChangesSeen(*_arguments(baseline, known, measurement))
+
+
+def _arguments(baseline: Calibration, known: Known, measurement: Measurement) -> tuple[Any, ...]:
+    return (
         with_stated_between_nodes(baseline, known),
         reduced_run(known, measurement),
         known.plan,
