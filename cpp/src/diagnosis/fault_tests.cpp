@@ -236,15 +236,6 @@ Eigen::VectorXd FaultTests::effect(const FaultHypothesis& hypothesis) const {
     return effect;
 }
 
-// q, from the effect.
-double FaultTests::controlled(int hypothesis, const Eigen::VectorXd& effect) const {
-    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
-    double q = 0.0;
-    for (const int r : hypotheses_->readings(h))
-        if (weight_[r] > 0.0) q += weight(h, r) * (weight(h, r) - equations_->row(r).product(effect));
-    return q < controlled_share * square(hypothesis) ? 0.0 : q;
-}
-
 std::vector<double> FaultTests::correlations(int hypothesis) const {
     std::vector<double> correlations(hypotheses_->all().size());
     each_correlation(&hypothesis, 1, effects(&hypothesis, 1),

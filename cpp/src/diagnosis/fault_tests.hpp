@@ -120,7 +120,6 @@ private:
     void add_gradient(const FaultHypothesis& hypothesis, NormalEquations::Side gradient) const;  // J^T c
     BorderedFactor::Sides gradients(const int* hypotheses, int count) const;
     void sum_readings();
-    double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
     // c of each hypothesis times what is shown by the readings, a row each: `use(hypothesis, OfSides)`.
     template <class Use>
     void each_product(const BorderedFactor::Sides& shown, const Use& use) const;

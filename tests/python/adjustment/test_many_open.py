@@ -1,4 +1,4 @@
-"""What two diagonals leave open is the same for any number of steps, also where it is too much to look at one by one."""
+"""What two diagonals leave open is the same for any number of steps, also where it is too much to look at each."""
 
 import numpy as np
 import pytest
