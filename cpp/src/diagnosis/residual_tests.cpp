@@ -63,18 +63,18 @@ std::vector<double> progress(const Measurement& measurement) {
 
 // --- scatter ---
 
-struct Group {
+struct ReadingGroup {
     std::string line, channel;
     int run = -1;
     FitAspect aspect = FitAspect::whole;
 
-    bool operator<(const Group& o) const {
+    bool operator<(const ReadingGroup& o) const {
         return std::tie(line, channel, run, aspect) < std::tie(o.line, o.channel, o.run, o.aspect);
     }
 };
 
 // A group and its complement make the same comparison: of the halves one is enough.
-std::map<Group, Share> shares_of_groups(const std::vector<ReadingResidual>& residuals,
+std::map<ReadingGroup, Share> shares_of_groups(const std::vector<ReadingResidual>& residuals,
                                         const std::vector<ReadingResidual>& by_noise, const Measurement& measurement,
                                         Share& all) {
     const std::vector<double> when = progress(measurement);
@@ -110,7 +110,7 @@ std::map<Group, Share> shares_of_groups(const std::vector<ReadingResidual>& resi
         if (when[r.row] > 0.5) second_half.add(share);
         if (2 * station.point > last_point[line]) far_half.add(share);
     }
-    std::map<Group, Share> groups;
+    std::map<ReadingGroup, Share> groups;
     for (const auto& [line, l] : lines) {
         groups[{line, ""}] = of_line[l];
         for (std::size_t c = 0; c < channels.size(); ++c) groups[{line, channels[c].name}] = of_both[l][c];
@@ -123,7 +123,7 @@ std::map<Group, Share> shares_of_groups(const std::vector<ReadingResidual>& resi
     return groups;
 }
 
-std::vector<ResidualPattern> scatter_of_groups(const std::map<Group, Share>& groups, const Share& all) {
+std::vector<ResidualPattern> scatter_of_groups(const std::map<ReadingGroup, Share>& groups, const Share& all) {
     std::vector<ResidualPattern> patterns;
     for (const auto& [group, share] : groups) {
         const Share others = share.rest_of(all);

@@ -229,7 +229,7 @@ private:
 };
 
 // The sequences of one set-up, up to `lanes` of them.
-struct Group {
+struct SetupSequences {
     const ReadingSequence* first;
     int count;
     std::vector<Step> steps;
@@ -237,7 +237,7 @@ struct Group {
     // Of what each part begins from, A: A^T R A, by part; and A^T R times what each step adds.
     std::vector<Lanes> square, common;
 
-    Group(const ReadingSequence* first, int count, const NormalEquations& equations, const BorderedBand& matrix)
+    SetupSequences(const ReadingSequence* first, int count, const NormalEquations& equations, const BorderedBand& matrix)
         : first(first),
           count(count),
           steps(steps_of(first, count, equations)),
@@ -248,7 +248,7 @@ struct Group {
 
 // What a part begins from, of one sequence: all readings from a step on.
 struct Start {
-    Group* group;
+    SetupSequences* group;
     int part, lane, step;
 };
 
@@ -284,7 +284,7 @@ void add_common(const std::vector<Start>& starts, const NormalEquations& equatio
 // One part of a group, added step by step.
 class Sweep {
 public:
-    Sweep(const Group& group, const Part& part, const NormalEquations& equations, const BorderedFactor& factor,
+    Sweep(const SetupSequences& group, const Part& part, const NormalEquations& equations, const BorderedFactor& factor,
           const BorderedBand& inverse)
         : group_(&group),
           part_(part),
@@ -299,7 +299,7 @@ public:
         }
     }
 
-    const Group& group() const { return *group_; }
+    const SetupSequences& group() const { return *group_; }
 
     // Adds the steps that come before this block is final. `squares`: of the group's sequences.
     void go_to(int block, const Eigen::VectorXd& variances, const Eigen::VectorXd& weight,
@@ -326,7 +326,7 @@ private:
             if (step.reading[lane] != none) squares[lane][step.place[lane]] = square[lane];
     }
 
-    const Group* group_;
+    const SetupSequences* group_;
     Part part_;
     Lanes square_of_start_;                                  // A^T R A
     Lanes square_ = Lanes::Zero(), common_ = Lanes::Zero();  // h^T R h, A^T R h
@@ -341,13 +341,13 @@ std::vector<std::vector<double>> slip_squares(const std::vector<ReadingSequence>
                                               const NormalEquations& equations, const BorderedFactor& factor,
                                               const BorderedBand& inverse, const Eigen::VectorXd& variances,
                                               const Eigen::VectorXd& weight) {
-    std::vector<Group> groups;
+    std::vector<SetupSequences> groups;
     for (std::size_t s = 0, end; s < sequences.size(); s = end) {
         for (end = s; end < std::min(sequences.size(), s + lanes) && sequences[end].setup == sequences[s].setup;) ++end;
         groups.emplace_back(&sequences[s], int(end - s), equations, inverse);
     }
     std::vector<Start> starts;
-    for (Group& group : groups)
+    for (SetupSequences& group : groups)
         for (int p = 0; p < int(group.parts.size()); ++p) {
             const int step = group.parts[p].forward ? group.parts[p].first : group.parts[p].end;
             for (int lane = 0; lane < group.count && step < int(group.steps.size()); ++lane)
@@ -357,8 +357,8 @@ std::vector<std::vector<double>> slip_squares(const std::vector<ReadingSequence>
 
     std::vector<std::vector<double>> squares;
     for (const ReadingSequence& sequence : sequences) squares.emplace_back(sequence.readings.size());
-    std::vector<std::pair<const Group*, const Part*>> parts;
-    for (const Group& group : groups)
+    std::vector<std::pair<const SetupSequences*, const Part*>> parts;
+    for (const SetupSequences& group : groups)
         for (const Part& part : group.parts) parts.emplace_back(&group, &part);
     // Some go along the band together, so that each of its blocks comes from memory once.
     constexpr std::size_t together = 16;

@@ -28,7 +28,7 @@ constexpr double clear_of_lines = 5.0;
 using Draws = Eigen::Matrix<double, Eigen::Dynamic, draws, Eigen::RowMajor>;
 
 // Readings of a channel, on one line or on all those without a group of their own.
-struct Group {
+struct ChannelGroup {
     std::string channel, line;
     std::vector<int> readings;
     double freedom = 0.0;  // sum of redundancies
@@ -42,11 +42,11 @@ struct Group {
 using Key = std::pair<std::string, std::string>;  // channel, line
 
 // A group for each key that is asked for, else for the channel.
-std::vector<Group> groups_of(Solution& solution, const std::vector<Key>& of_lines) {
+std::vector<ChannelGroup> groups_of(Solution& solution, const std::vector<Key>& of_lines) {
     const AdjustmentProblem& problem = solution.problem();
     const Eigen::VectorXd& variances = solution.reading_variances();
-    std::map<Key, Group> groups;
-    std::map<std::pair<int, int>, std::pair<Group*, std::vector<int>>> sequences;  // by set-up and channel
+    std::map<Key, ChannelGroup> groups;
+    std::map<std::pair<int, int>, std::pair<ChannelGroup*, std::vector<int>>> sequences;  // by set-up and channel
     for (const AdjustedPoint& point : problem.points())
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             const AdjustedReading& reading = problem.readings()[r];
@@ -72,7 +72,7 @@ std::vector<Group> groups_of(Solution& solution, const std::vector<Key>& of_line
             if (redundancy > least_redundancy) group->differences.push_back({a, b, redundancy});
         }
     }
-    std::vector<Group> list;
+    std::vector<ChannelGroup> list;
     for (auto& entry : groups) list.push_back(std::move(entry.second));
     return list;
 }
@@ -111,11 +111,11 @@ struct Scales {
 };
 
 template <class Residual>
-Scales scales(const Group& group, const Residual& residual) {
+Scales scales(const ChannelGroup& group, const Residual& residual) {
     double of_residuals = 0.0;
     for (const int r : group.readings) of_residuals += std::pow(residual(r), 2);
     std::vector<double> squares;
-    for (const Group::Difference& d : group.differences)
+    for (const ChannelGroup::Difference& d : group.differences)
         squares.push_back(std::pow(residual(d.b) - residual(d.a), 2) / d.redundancy);
     const auto half = squares.begin() + std::ptrdiff_t(squares.size() / 2);
     std::nth_element(squares.begin(), half, squares.end());
@@ -128,7 +128,7 @@ Scales scales(const Group& group, const Residual& residual) {
 // Of the residuals beside those of the draws.
 class Comparison {
 public:
-    Comparison(const Group& group, const Eigen::VectorXd& residuals, const Draws& noise)
+    Comparison(const ChannelGroup& group, const Eigen::VectorXd& residuals, const Draws& noise)
         : is_possible_(int(group.differences.size()) >= fewest_differences) {
         if (!is_possible_) return;
         observed_ = scales(group, [&](int r) { return residuals[r]; });
@@ -175,7 +175,7 @@ bool is_clearly_larger(const Factor& one, const Factor& other) {
 }
 
 // By square sums.
-std::vector<Factor> factors_of_squares(const std::vector<Group>& groups, const Eigen::VectorXd& residuals,
+std::vector<Factor> factors_of_squares(const std::vector<ChannelGroup>& groups, const Eigen::VectorXd& residuals,
                                        const std::vector<Draws>& noise) {
     const Eigen::Index count = Eigen::Index(groups.size());
     Eigen::MatrixXd s(count, count);
@@ -202,7 +202,7 @@ std::vector<Factor> factors_of_squares(const std::vector<Group>& groups, const E
 }
 
 // Times the noise that was stated.
-double weighed_with(const AdjustmentProblem& problem, const Group& group) {
+double weighed_with(const AdjustmentProblem& problem, const ChannelGroup& group) {
     const AdjustedReading& reading = problem.readings()[group.readings.front()];
     return reading.standard_uncertainty / reading.noise;
 }
@@ -215,16 +215,16 @@ double probability_of_factor(const Factor& factor) {
 }
 
 // Lines on which a channel scatters clearly more than on its others.
-std::vector<Key> uneven_lines(Solution& solution, const std::vector<Group>& groups, const Eigen::VectorXd& residuals,
+std::vector<Key> uneven_lines(Solution& solution, const std::vector<ChannelGroup>& groups, const Eigen::VectorXd& residuals,
                               const Draws& noise) {
     std::vector<Key> every, uneven;
     for (const LineSetup& setup : solution.problem().setups())
-        for (const Group& group : groups) every.emplace_back(group.channel, setup.line.name());
-    const std::vector<Group> of_lines = groups_of(solution, every);
-    for (const Group& channel : groups) {
+        for (const ChannelGroup& group : groups) every.emplace_back(group.channel, setup.line.name());
+    const std::vector<ChannelGroup> of_lines = groups_of(solution, every);
+    for (const ChannelGroup& channel : groups) {
         if (!channel.line.empty()) continue;
         const Factor usual = Comparison(channel, residuals, noise).robust();
-        for (const Group& line : of_lines) {
+        for (const ChannelGroup& line : of_lines) {
             if (line.channel != channel.channel) continue;
             const Factor factor = Comparison(line, residuals, noise).robust();
             if (factor.standard_uncertainty < thresholds.widest_component * factor.value &&
@@ -248,15 +248,15 @@ std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std:
     std::vector<Key> of_lines;
     for (const NoiseFactor& each : weighed)
         if (!each.line.empty()) of_lines.emplace_back(each.channel, each.line);
-    std::vector<Group> groups;
+    std::vector<ChannelGroup> groups;
     std::vector<Factor> factors;
     Draws noise;  // of all groups, each with its factor
     const auto look = [&] {
         groups.clear();
-        for (Group& group : groups_of(solution, of_lines))
+        for (ChannelGroup& group : groups_of(solution, of_lines))
             if (group.freedom >= fewest_freedom) groups.push_back(std::move(group));
         std::vector<Draws> by_group;
-        for (const Group& group : groups) by_group.push_back(responses(solution, group.readings));
+        for (const ChannelGroup& group : groups) by_group.push_back(responses(solution, group.readings));
         factors = factors_of_squares(groups, residuals, by_group);
         noise = Draws::Zero(residuals.size(), draws);
         for (std::size_t g = 0; g < groups.size(); ++g) noise += std::max(1.0, factors[g].value) * by_group[g];
