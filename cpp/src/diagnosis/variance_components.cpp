@@ -19,7 +19,7 @@ namespace {
 constexpr int draws = 16;                  // a multiple of BorderedFactor::sides, whatever that is
 constexpr double least_redundancy = 0.02;  // of two readings whose difference counts
 constexpr int fewest_differences = 8;
-constexpr double fewest_freedom = 2.0;  // sum of redundancies
+constexpr double least_freedom = 2.0;  // sum of redundancies
 constexpr double clear_of_noise = 4.0;  // standard deviations of the draws
 // Standard uncertainties by which the factor of a line is clearly larger than that of its channel: there are many
 // lines.
@@ -254,7 +254,7 @@ std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std:
     const auto look = [&] {
         groups.clear();
         for (ChannelGroup& group : groups_of(solution, of_lines))
-            if (group.freedom >= fewest_freedom) groups.push_back(std::move(group));
+            if (group.freedom >= least_freedom) groups.push_back(std::move(group));
         std::vector<Draws> by_group;
         for (const ChannelGroup& group : groups) by_group.push_back(responses(solution, group.readings));
         factors = factors_of_squares(groups, residuals, by_group);
