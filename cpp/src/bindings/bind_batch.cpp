@@ -81,7 +81,7 @@ void evaluate_on_threads(const EvaluatorOfPattern& of, const double* readings, s
     if (failure) std::rethrow_exception(failure);
 }
 
-DoubleArray evaluate(const EvaluatorOfPattern& of, const ArrayLike& readings, const IntegerLike& threads) {
+DoubleArray evaluate_runs(const EvaluatorOfPattern& of, const ArrayLike& readings, const IntegerLike& threads) {
     const DoubleArray array = DoubleArray::ensure(readings);
     if (!array || array.ndim() != 3 || std::size_t(array.shape(1)) != of.rows ||
         std::size_t(array.shape(2)) != of.channels.size()) {
@@ -155,7 +155,7 @@ void bind_batch(py::module_& m) {
         .def_property_readonly(
             "calibration", [](const Evaluator& e) { return e.evaluator.of_pattern(); },
             "The evaluation of the pattern, with standard uncertainties.")
-        .def("evaluate", &evaluate, py::arg("readings"), py::arg("threads") = integer(0),
+        .def("evaluate", &evaluate_runs, py::arg("readings"), py::arg("threads") = integer(0),
              "(n, entries), mm and rad, from readings (n, rows of the pattern, channels); NaN for a set with a lost "
              "reading or without a solution. A set gives the same bits whatever stands beside it. threads: 0 for all "
              "cores. Raises InvalidArgument.")

@@ -251,7 +251,7 @@ void bind_runs(py::module_& m) {
 namespace {
 
 // Evaluates whole groups of lanes, and copies the samples that were asked for.
-DoubleArray evaluate(const SampleModel& model, std::uint64_t first_sample, std::size_t samples) {
+DoubleArray evaluate_samples(const SampleModel& model, std::uint64_t first_sample, std::size_t samples) {
     constexpr std::size_t at_a_time = 64 * lane_group;
     const std::size_t outputs = model.outputs().size();
     DoubleArray result({py::ssize_t(outputs), py::ssize_t(samples)});
@@ -295,7 +295,7 @@ static void bind_sample_model(py::module_& m) {
             [](const SampleModel& model, const IntegerLike& first_sample, const IntegerLike& samples) {
                 const auto count = to_integer(samples, "samples", 0, std::int64_t(1) << 32);
                 const auto first = to_integer(first_sample, "first_sample", 0, std::int64_t(1) << 62);
-                return evaluate(model, std::uint64_t(first), std::size_t(count));
+                return evaluate_samples(model, std::uint64_t(first), std::size_t(count));
             },
             py::arg("first_sample"), py::arg("samples"),
             "Array (outputs, samples); NaN in all outputs of a sample that gave no result. Raises InvalidArgument.");
