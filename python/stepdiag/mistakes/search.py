@@ -463,7 +463,10 @@ def _best_of(family: Family, copy: Copy, as_read: _Fit, least_gain: float, *, be
 
     def fit(value: float) -> _Fit:
         if value not in fits:
-            fits[value] = _fit_of(family.make(value).change(copy), ENOUGH)
+            made = family.make(value)
+            fitted = _fit_of(made.change(copy), ENOUGH)
+            # Smaller readings have smaller residuals, whatever they are.
+            fits[value] = replace(fitted, square_sum=fitted.square_sum + made.free)
         return fits[value]
 
     if begin:

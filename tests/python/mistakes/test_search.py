@@ -51,6 +51,14 @@ def test_readings_made_smaller_explain_nothing() -> None:
     assert sd.find_mistakes(scenario, run) == []
 
 
+def test_a_gain_is_not_larger_because_smaller_readings_fit_better() -> None:
+    scenario = described("ideal", steps=50)
+    run = simulated(scenario, seed=0)
+    found = sd.find_mistakes(scenario, changed(run, {n: 1.2 * run.channels[n] for n in ("alpha", "beta")}))
+    assert [(one.entry, one.fit) for one in found] == [("near factor", "accepted")]
+    assert found[0].text.startswith("alpha and beta are too large by a factor of 1.1")
+
+
 def test_two_mistakes_at_once_are_named() -> None:
     scenario = described("ideal", steps=6)
     run = simulated(scenario, seed=5, plan=step_plan(6, order="ZYX"))
