@@ -75,8 +75,8 @@ struct ReadingGroup {
 
 // A group and its complement make the same comparison: of the halves one is enough.
 std::map<ReadingGroup, Share> shares_of_groups(const std::vector<ReadingResidual>& residuals,
-                                        const std::vector<ReadingResidual>& by_noise, const Measurement& measurement,
-                                        Share& all) {
+                                               const std::vector<ReadingResidual>& by_noise,
+                                               const Measurement& measurement, Share& all) {
     const std::vector<double> when = progress(measurement);
     std::map<std::string, int> lines;  // in the order of their names
     std::vector<int> line_of;          // by row

@@ -237,7 +237,8 @@ struct SetupSequences {
     // Of what each part begins from, A: A^T R A, by part; and A^T R times what each step adds.
     std::vector<Lanes> square, common;
 
-    SetupSequences(const ReadingSequence* first, int count, const NormalEquations& equations, const BorderedBand& matrix)
+    SetupSequences(const ReadingSequence* first, int count, const NormalEquations& equations,
+                   const BorderedBand& matrix)
         : first(first),
           count(count),
           steps(steps_of(first, count, equations)),

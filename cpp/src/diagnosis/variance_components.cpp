@@ -19,7 +19,7 @@ namespace {
 constexpr int draws = 16;                  // a multiple of BorderedFactor::sides, whatever that is
 constexpr double least_redundancy = 0.02;  // of two readings whose difference counts
 constexpr int fewest_differences = 8;
-constexpr double least_freedom = 2.0;  // sum of redundancies
+constexpr double least_freedom = 2.0;   // sum of redundancies
 constexpr double clear_of_noise = 4.0;  // standard deviations of the draws
 // Standard uncertainties by which the factor of a line is clearly larger than that of its channel: there are many
 // lines.
@@ -215,8 +215,8 @@ double probability_of_factor(const Factor& factor) {
 }
 
 // Lines on which a channel scatters clearly more than on its others.
-std::vector<Key> uneven_lines(Solution& solution, const std::vector<ChannelGroup>& groups, const Eigen::VectorXd& residuals,
-                              const Draws& noise) {
+std::vector<Key> uneven_lines(Solution& solution, const std::vector<ChannelGroup>& groups,
+                              const Eigen::VectorXd& residuals, const Draws& noise) {
     std::vector<Key> every, uneven;
     for (const LineSetup& setup : solution.problem().setups())
         for (const ChannelGroup& group : groups) every.emplace_back(group.channel, setup.line.name());
