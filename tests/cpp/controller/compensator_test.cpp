@@ -16,17 +16,12 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// The machine adds up positions of 1,000 mm, each rounded to 1e-13 mm; the compensator adds up errors.
-constexpr double machine_rounding = 2e-12;  // mm
-
 CompensatorOptions outside(Outside what, double margin = 0.0) {
     CompensatorOptions options;
     options.outside = what;
     options.margin = margin;
     return options;
 }
-
-double distance(const Position& a, const Position& b) { return (vector(a) - vector(b)).norm(); }
 
 TEST(Compensator, ErrorIsThatOfTheMachineInEveryChain) {
     for (const std::string& chain : all_chains()) {

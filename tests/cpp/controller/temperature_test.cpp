@@ -12,8 +12,6 @@
 namespace stepdiag {
 namespace {
 
-// The machine adds up positions of 1,000 mm, each rounded to 1e-13 mm; the compensator adds up errors.
-constexpr double machine_rounding = 2e-12;  // mm
 constexpr unsigned not_taken = compensation_refused | compensation_temperature;
 
 CompensatorOptions range(double lowest = 5.0, double highest = 45.0) {
@@ -21,8 +19,6 @@ CompensatorOptions range(double lowest = 5.0, double highest = 45.0) {
     options.temperatures = {lowest, highest};
     return options;
 }
-
-double distance(const Position& a, const Position& b) { return (vector(a) - vector(b)).norm(); }
 
 TEST(CompensatorTemperature, ErrorIsThatOfTheMachineWhoseScalesExpandInEveryChain) {
     const Approaches forward = {Approach::positive, Approach::positive, Approach::positive};

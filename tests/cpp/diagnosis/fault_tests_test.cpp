@@ -9,6 +9,7 @@
 #include "adjustment/gauss_newton.hpp"
 #include "adjustment/observability.hpp"
 #include "adjustment/smoothness.hpp"
+#include "stepdiag/core/units.hpp"
 #include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/evaluation/thresholds.hpp"
 #include "stepdiag/simulation/simulate.hpp"
@@ -28,12 +29,12 @@ using stepdiag::FaultKind;
 using stepdiag::FaultTests;
 using stepdiag::Line;
 using stepdiag::Measurement;
+using stepdiag::micrometre;
+using stepdiag::microradian;
 using stepdiag::Plan;
 
-constexpr double micro = 1e-6, micrometre = 1e-3;
-
 // A run of a machine with errors, its lines a little out of true.
-struct Workshop {
+struct FaultWorkshop {
     int steps = 4, repeats = 1;
     std::vector<Line> lines = stepdiag::test::diagonals;
     bool backward = false;
@@ -51,10 +52,10 @@ struct Workshop {
     Measurement run() const {
         stepdiag::SimulationOptions simulation;
         for (const Line& line : lines) {
-            simulation.misalignment[line.name()].reflector = {200 * micro, -100 * micro};
-            simulation.misalignment[line.name()].laser = {-150 * micro, 250 * micro};
+            simulation.misalignment[line.name()].reflector = {200 * microradian, -100 * microradian};
+            simulation.misalignment[line.name()].laser = {-150 * microradian, 250 * microradian};
         }
-        simulation.noise = {0.1 * micrometre, 1 * micro, 0.0, 5};
+        simulation.noise = {0.1 * micrometre, 1 * microradian, 0.0, 5};
         simulation.repeats = repeats;
         simulation.backward = backward;
         return simulate(machine(), plan(), stepdiag::Head{}, simulation);
@@ -78,7 +79,7 @@ struct Solved {
     stepdiag::BorderedBand inverse;
     FaultHypotheses hypotheses;
 
-    Solved(const Workshop& shop, const Measurement& run, int left_out = -1)
+    Solved(const FaultWorkshop& shop, const Measurement& run, int left_out = -1)
         : problem(with_row_left_out(shop, run, left_out)),
           solver(problem, shop.options.smoothness ? given_deviations(*shop.options.smoothness) : NoSmoothness{}),
           inverse(solver.equations().matrix()),
@@ -90,7 +91,7 @@ struct Solved {
         solver.refresh(x);
         solver.factor().selected_inverse(inverse);
     }
-    static AdjustmentProblem with_row_left_out(const Workshop& shop, const Measurement& run, int row) {
+    static AdjustmentProblem with_row_left_out(const FaultWorkshop& shop, const Measurement& run, int row) {
         AdjustmentProblem problem(run, shop.plan(), shop.machine().chain(), Vector3d(20, -10, 50),
                                   stepdiag::Head{}.calibration(), shop.options);
         for (auto& reading : problem.readings())
@@ -176,7 +177,7 @@ VectorXd indicator(const Solved& solved, const FaultHypothesis& hypothesis) {
     return c;
 }
 
-void expect_as_computed_densely(const Workshop& shop, int left_out = -1) {
+void expect_as_computed_densely(const FaultWorkshop& shop, int left_out = -1) {
     const Solved solved(shop, shop.run(), left_out);
     const FaultTests tests = solved.tests();
     const Dense dense(solved);
@@ -218,15 +219,15 @@ void expect_as_computed_densely(const Workshop& shop, int left_out = -1) {
 TEST(FaultTests, AreWhatDenseMatricesSay) { expect_as_computed_densely({}); }
 
 TEST(FaultTests, AreWhatDenseMatricesSayOfRunsBothWaysWithPriorsAndSmoothness) {
-    Workshop shop;
+    FaultWorkshop shop;
     shop.backward = true;
     shop.options.setup[int(stepdiag::SetupQuantity::distance_constant)] = 5 * micrometre;
-    shop.options.smoothness = stepdiag::Smoothness{1 * micrometre, 5 * micro, false};
+    shop.options.smoothness = stepdiag::Smoothness{1 * micrometre, 5 * microradian, false};
     expect_as_computed_densely(shop);
 }
 
 TEST(FaultTests, TakeNoNoteOfReadingsThatAreLeftOut) {
-    const Workshop shop;
+    const FaultWorkshop shop;
     expect_as_computed_densely(shop, 5);
     const Solved whole(shop, shop.run()), without(shop, shop.run(), 5);
     // Its own fault, and the slip from it on, which is now the next one's.
@@ -235,7 +236,7 @@ TEST(FaultTests, TakeNoNoteOfReadingsThatAreLeftOut) {
 }
 
 TEST(FaultTests, HaveEachFaultOnce) {
-    const Workshop shop;
+    const FaultWorkshop shop;
     const Solved solved(shop, shop.run());
     // Four diagonals of 13 points and three channels, with constants that are free: 13 readings and 10 slips in between
     // (from the third to the last but one), and a factor on their distances. Three scale lines of two points: a fault
@@ -243,14 +244,14 @@ TEST(FaultTests, HaveEachFaultOnce) {
     EXPECT_EQ(solved.hypotheses.all().size(), std::size_t(4 * (3 * (13 + 10) + 1) + 3 * 3));
     EXPECT_EQ(solved.hypotheses.sequences().size(), std::size_t(4 * 3 + 3 * 3));
     // With a constant that is known the whole channel may be off, and each end by itself.
-    Workshop known = shop;
+    FaultWorkshop known = shop;
     known.options.setup[int(stepdiag::SetupQuantity::distance_constant)] = stepdiag::fixed_unknown;
     EXPECT_EQ(Solved(known, known.run()).hypotheses.all().size(),
               std::size_t(4 * (3 * 13 + 2 * 10 + 12 + 1) + 3 * (2 + 1 + 2)));
 }
 
 TEST(FaultTests, OrderReadingsByTimeThroughBothDirections) {
-    Workshop shop;
+    FaultWorkshop shop;
     shop.backward = true;
     const Solved solved(shop, shop.run());
     for (const auto& sequence : solved.hypotheses.sequences())
@@ -262,7 +263,7 @@ TEST(FaultTests, OrderReadingsByTimeThroughBothDirections) {
 
 // The parabola through three adjustments is what an adjustment with the fault as an unknown finds.
 TEST(FaultTests, AgreeWithActualAdjustments) {
-    const Workshop shop;
+    const FaultWorkshop shop;
     const Measurement run = shop.run();
     const Solved solved(shop, run);
     for (const auto& [kind, channel, first] : {std::tuple(FaultKind::slip, 0, 6),
@@ -271,7 +272,9 @@ TEST(FaultTests, AgreeWithActualAdjustments) {
                                                {FaultKind::reading, 2, 9},
                                                {FaultKind::factor, 0, 0}}) {
         const auto hypothesis = solved.hypotheses.all()[solved.find(kind, "npp", channel, first)];
-        const double size = kind == FaultKind::factor ? 10 * micrometre : channel == 0 ? 2 * micrometre : 20 * micro;
+        const double size = kind == FaultKind::factor ? 10 * micrometre
+                            : channel == 0            ? 2 * micrometre
+                                                      : 20 * microradian;
         const Measurement wrong = with_fault(run, solved, hypothesis, size);
         const auto score = Solved(shop, wrong).tests().scores()[solved.find(kind, "npp", channel, first)];
         const double step = 0.5 * size;
@@ -292,7 +295,7 @@ TEST(FaultTests, AgreeWithActualAdjustments) {
 }
 
 TEST(FaultTests, EffectIsWhatAFaultDoesToTheSolution) {
-    const Workshop shop;
+    const FaultWorkshop shop;
     const Measurement run = shop.run();
     const Solved solved(shop, run);
     const int slip = solved.find(FaultKind::slip, "npp", 0, 6);
@@ -305,7 +308,7 @@ TEST(FaultTests, EffectIsWhatAFaultDoesToTheSolution) {
 }
 
 TEST(FaultTests, OfTheStandardPlanAllHaveATwinOnAnotherLine) {
-    Workshop shop;
+    FaultWorkshop shop;
     shop.steps = 20;
     const Solved solved(shop, shop.run());
     const FaultTests tests = solved.tests();
@@ -327,11 +330,11 @@ TEST(FaultTests, OfTheStandardPlanAllHaveATwinOnAnotherLine) {
 }
 
 TEST(FaultTests, ThreeFaceDiagonalsOrEverythingTwiceBreakAllTwins) {
-    Workshop faces, twice;
+    FaultWorkshop faces, twice;
     faces.steps = twice.steps = 10;
     for (const char* face : {"pp0", "p0p", "0pp"}) faces.lines.push_back(Line::parse(face));
     twice.repeats = 2;
-    for (const Workshop& shop : {faces, twice}) {
+    for (const FaultWorkshop& shop : {faces, twice}) {
         const Solved solved(shop, shop.run());
         const FaultTests tests = solved.tests();
         for (const auto& [kind, line, first] : {std::tuple(FaultKind::slip, "npp", 16),
@@ -345,7 +348,7 @@ TEST(FaultTests, ThreeFaceDiagonalsOrEverythingTwiceBreakAllTwins) {
 // One way and both ways, in other orders of rows, of more set-ups than are worth a dense matrix, and of too few lines,
 // where the inverse loses digits.
 TEST(FaultTests, OfSlipsAreWhatSolutionsSay) {
-    Workshop shop, both_ways, many, few;
+    FaultWorkshop shop, both_ways, many, few;
     shop.steps = both_ways.steps = 20;
     few.steps = 10;
     few.lines = {Line::parse("ppp"), Line::parse("npp")};
@@ -385,7 +388,7 @@ TEST(FaultTests, OfSlipsAreWhatSolutionsSay) {
 
 // By the dense matrices: what the diagonals of 1 - H and (1 - H)^2 differ by, line by line.
 TEST(PriorShares, AreWhatRedundanciesOweToPriors) {
-    Workshop shop;
+    FaultWorkshop shop;
     shop.repeats = 3;
     const Solved solved(shop, shop.run());
     const Dense dense(solved);

@@ -6,6 +6,7 @@
 
 #include "stepdiag/head/spot_sensor.hpp"
 #include "support/refuses.hpp"
+#include "support/special_numbers.hpp"
 
 namespace {
 
@@ -14,9 +15,8 @@ using Eigen::Vector2d;
 using stepdiag::BeamSpot;
 using stepdiag::Camera;
 using stepdiag::Centroid;
-
-constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinite = std::numeric_limits<double>::infinity();
+using stepdiag::test::infinite;
+using stepdiag::test::undefined;
 
 Camera small_camera() {
     Camera camera;

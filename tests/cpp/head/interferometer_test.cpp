@@ -9,6 +9,7 @@
 
 #include "stepdiag/core/units.hpp"
 #include "support/refuses.hpp"
+#include "support/special_numbers.hpp"
 
 namespace {
 
@@ -19,9 +20,8 @@ using stepdiag::Interferometer;
 using stepdiag::pi;
 using stepdiag::ReadingModel;
 using stepdiag::ReturnedBeam;
+using stepdiag::test::undefined;
 using Complex = std::complex<double>;
-
-constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 
 // Field of a Gaussian beam of power 1 by its textbook radius, curvature and Gouy phase, `z` behind its waist.
 Complex field(const GaussianMode& mode, double r2, double z) {

@@ -8,6 +8,7 @@
 #include "head/spot_profile.hpp"
 #include "stepdiag/core/units.hpp"
 #include "support/refuses.hpp"
+#include "support/special_numbers.hpp"
 
 namespace {
 
@@ -16,9 +17,8 @@ using stepdiag::BeamSpot;
 using stepdiag::Camera;
 using stepdiag::LateralEffect;
 using stepdiag::pi;
-
-constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinite = std::numeric_limits<double>::infinity();
+using stepdiag::test::infinite;
+using stepdiag::test::undefined;
 
 double irradiance(double x, double centre, double radius) {
     return std::sqrt(2.0 / pi) / radius * std::exp(-2.0 * std::pow((x - centre) / radius, 2));

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -17,8 +18,8 @@ using stepdiag::FunctionId;
 using stepdiag::FunctionTable;
 using stepdiag::ParameterTable;
 using stepdiag::Squareness;
+using stepdiag::test::volume;
 
-const Vector3d volume(800.0, 600.0, 500.0);
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 

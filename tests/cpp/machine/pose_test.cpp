@@ -6,6 +6,7 @@
 
 #include "stepdiag/machine/machine.hpp"
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -15,8 +16,7 @@ using stepdiag::Axis;
 using stepdiag::Chain;
 using stepdiag::ErrorMap;
 using stepdiag::Machine;
-
-const Vector3d volume(800.0, 600.0, 500.0);
+using stepdiag::test::volume;
 
 ErrorMap random_map(double scale) {
     stepdiag::RandomErrorMap options;

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "optics/usual_media.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/optics/path.hpp"
@@ -15,11 +16,10 @@ namespace {
 
 using namespace stepdiag;
 using Eigen::Vector3d;
-
-constexpr Medium glass{1.5168}, air{1.00027};
-
-// Directions and lengths of some tens of millimetres come from fewer than twenty rounded operations a face.
-constexpr double direction_rounding = 1e-14, length_rounding = 1e-12;
+using stepdiag::test::air;
+using stepdiag::test::direction_rounding;
+using stepdiag::test::glass;
+using stepdiag::test::length_rounding;
 
 Ray ray_at(double incidence, const Vector3d& through, double before) {
     const Vector3d direction(std::sin(incidence), 0.0, std::cos(incidence));

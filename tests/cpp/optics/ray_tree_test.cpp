@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "optics/usual_media.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
 #include "support/refuses.hpp"
@@ -15,14 +16,13 @@ namespace {
 using namespace stepdiag;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr Medium glass{1.5168}, air{1.00027};
+using stepdiag::test::air;
+using stepdiag::test::direction_rounding;
+using stepdiag::test::glass;
+using stepdiag::test::length_rounding;
 
 // Sums of up to thousands of shares, each rounded to 1e-16 of the source's power.
 constexpr double power_rounding = 1e-12;
-
-// Directions and lengths of some hundreds of millimetres come from fewer than twenty rounded operations a face.
-constexpr double direction_rounding = 1e-14, length_rounding = 1e-12;
 
 void append(std::vector<Face>& faces, const std::vector<Face>& more) {
     faces.insert(faces.end(), more.begin(), more.end());

@@ -23,8 +23,6 @@ Face square(double z, double size, Surface surface, const Matrix3d& turn = Matri
     return make_rectangle({0, 0, z}, turn, {size, size}, surface);
 }
 
-constexpr double gap = 1e-3;
-
 }  // namespace
 
 TEST(Replay, NaNInAnyNumberFailsItsLaneAndNoOther) {

@@ -22,8 +22,6 @@ using stepdiag::Ray;
 using stepdiag::RigidRate;
 using stepdiag::Surface;
 
-constexpr double gap = 1e-3;
-
 RigidRate turning(const Vector3d& rotation, const Vector3d& about) {
     RigidRate rate;
     rate.rotation = rotation, rate.about = about;

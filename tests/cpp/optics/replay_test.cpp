@@ -26,8 +26,6 @@ struct Target {
     ~Target() { stepdiag::choose_instruction_set(before); }
 };
 
-constexpr double gap = 1e-3;
-
 }  // namespace
 
 TEST(Replay, IsTheTraceToRounding) {

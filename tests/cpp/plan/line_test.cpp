@@ -6,14 +6,14 @@
 #include <cmath>
 
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using stepdiag::Line;
-
-const Vector3d volume(800.0, 600.0, 500.0);
+using stepdiag::test::volume;
 
 std::vector<std::string> all_names() {
     std::vector<std::string> names;

@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "simulation/two_diagonals.hpp"
 #include "support/refuses.hpp"
 #include "support/traced_mirror.hpp"
 #include "support/usual.hpp"
@@ -25,16 +26,8 @@ using stepdiag::Plan;
 using stepdiag::SimulationOptions;
 using stepdiag::test::chain;
 using stepdiag::test::volume;
-
-Machine machine() {
-    stepdiag::RandomErrorMap options;
-    options.seed = 4;
-    return Machine(chain, stepdiag::make_random_error_map(volume, options), {5.0, -3.0, 70.0});
-}
-
-Plan plan(int steps = 10) {
-    return Plan(volume, {Line::parse("ppp"), Line::parse("nnp")}, steps, stepdiag::all_axes, {Line::parse("p00")});
-}
+using stepdiag::test::two_diagonals::machine;
+using stepdiag::test::two_diagonals::plan;
 
 }  // namespace
 

@@ -20,6 +20,10 @@ inline const std::string test_chain = "[w X' b Y Z t]";
 
 inline Eigen::Vector3d vector(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position position(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+inline double distance(const Position& a, const Position& b) { return (vector(a) - vector(b)).norm(); }
+
+// The machine adds up positions of 1,000 mm, each rounded to 1e-13 mm; the compensator adds up errors.
+inline constexpr double machine_rounding = 2e-12;  // mm
 
 inline ParameterTable with_header(ParameterTable table, const std::string& chain = test_chain,
                                   const Eigen::Vector3d& volume = test_volume) {

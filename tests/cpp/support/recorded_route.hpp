@@ -12,6 +12,8 @@
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 
+inline constexpr double gap = 1e-3;  // mm
+
 // Faces, indices and events of a path. They are common to all lanes unless a test replaces them by arrays.
 struct RecordedRoute {
     std::deque<stepdiag::FaceFrame> frames;  // a deque, because its elements do not move

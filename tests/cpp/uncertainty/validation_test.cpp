@@ -53,7 +53,7 @@ Validation compared(const Function& f, const std::vector<Distribution>& distribu
     return compare(propagated(f, distributions, unit), drawn(f, distributions, unit, samples), digits);
 }
 
-Distribution normal(double mean, double u) { return {DistributionKind::normal, mean, u}; }
+Distribution gaussian(double mean, double u) { return {DistributionKind::normal, mean, u}; }
 
 void expect_reason(const Validation& validation, const std::vector<std::string>& words) {
     EXPECT_FALSE(validation.validated[0]);
@@ -65,7 +65,7 @@ void expect_reason(const Validation& validation, const std::vector<std::string>&
 }  // namespace
 
 TEST(Validation, SumOfFourNormalsIsValidated) {  // JCGM 101, 9.2.2
-    const Validation v = compared([](const VectorXd& x) { return x.sum(); }, std::vector(4, normal(0, 1)));
+    const Validation v = compared([](const VectorXd& x) { return x.sum(); }, std::vector(4, gaussian(0, 1)));
     EXPECT_TRUE(v.validated[0]);
     EXPECT_EQ(v.reason[0], "");
     EXPECT_EQ(v.delta[0], 0.05);  // u = 2.0
@@ -94,39 +94,39 @@ TEST(Validation, DominatingRectangleIsNamed) {  // JCGM 101, 9.2.4
 TEST(Validation,
      SquareThatShiftsTheMeanIsNamedWithItsFigures) {  // mass calibration, JCGM 101, 9.3, in short: a product
     const Validation v = compared([](const VectorXd& x) { return 0.1e-6 * x[0] + 0.8e-6 * x[1] * x[1]; },
-                                  {normal(0, 1), normal(0, 1)}, "rad");
+                                  {gaussian(0, 1), gaussian(0, 1)}, "rad");
     expect_reason(v, {"the mean is shifted by 0.8 urad", "the square of x1 moves it by 0.8 urad, u is 0.1 urad",
                       "u is 1.1 urad by Monte Carlo and 0.1 urad by propagation", "skew"});
 }
 
 TEST(Validation, ProductsOfInputsAreNotTakenForSquares) {
     const Validation v = compared([](const VectorXd& x) { return 0.1 * x[0] + x[1] * x[2]; },
-                                  {normal(0, 1), normal(0, 1), normal(0, 1)}, "mm");
+                                  {gaussian(0, 1), gaussian(0, 1), gaussian(0, 1)}, "mm");
     expect_reason(v, {"products of two inputs"});
 }
 
 TEST(Validation, ScaledDistributionOfFewObservationsIsSaid) {
     const Validation v = compared([](const VectorXd& x) { return x.sum(); },
-                                  {{DistributionKind::student_t, 0.0, 1.0, 4.0}, normal(0, 0.3)});
+                                  {{DistributionKind::student_t, 0.0, 1.0, 4.0}, gaussian(0, 0.3)});
     expect_reason(v, {"t distribution"});
 }
 
 TEST(Validation, OutputsWithoutUncertaintyAreValidatedUnlessTheyMove) {
     const auto constant = [](const VectorXd& x) { return 5.0 + 0.0 * x[0]; };
-    EXPECT_TRUE(compared(constant, {normal(0, 1)}, "mm", 20'000).validated[0]);
-    const Validation v = compared([](const VectorXd& x) { return 1e-3 * x[0] * x[0]; }, {normal(0, 1)}, "mm");
+    EXPECT_TRUE(compared(constant, {gaussian(0, 1)}, "mm", 20'000).validated[0]);
+    const Validation v = compared([](const VectorXd& x) { return 1e-3 * x[0] * x[0]; }, {gaussian(0, 1)}, "mm");
     expect_reason(v, {"the square of x0 moves it by 1 um, u is 0 um"});
 }
 
 TEST(Validation, FewSamplesAreSaidToBeFew) {
-    const Validation v = compared([](const VectorXd& x) { return x[0]; }, {normal(0, 0.99)}, "1", 10'000, 3);
+    const Validation v = compared([](const VectorXd& x) { return x[0]; }, {gaussian(0, 0.99)}, "1", 10'000, 3);
     expect_reason(v, {"it may be chance"});
 }
 
 TEST(Validation, RefusesResultsOfOtherOutputs) {
     const auto f = [](const VectorXd& x) { return x[0]; };
-    const auto propagation = propagated(f, {normal(0, 1)}, "mm");
-    const auto result = drawn(f, {normal(0, 1)}, "rad", 20'000);
+    const auto propagation = propagated(f, {gaussian(0, 1)}, "mm");
+    const auto result = drawn(f, {gaussian(0, 1)}, "rad", 20'000);
     expect_refused([&] { compare(propagation, result); }, "outputs");
-    expect_refused([&] { compare(propagation, drawn(f, {normal(0, 1)}, "mm", 20'000), 4); }, "digits");
+    expect_refused([&] { compare(propagation, drawn(f, {gaussian(0, 1)}, "mm", 20'000), 4); }, "digits");
 }
