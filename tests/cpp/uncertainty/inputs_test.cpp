@@ -86,7 +86,7 @@ TEST(UncertainInputs, GivenTwiceOrWithoutSenseIsRefusedByName) {
 TEST(UncertainInputs, CorrelationsAreOfNormalInputsAndOnceEach) {
     EXPECT_NO_THROW(check(correlated({0, 1}, pair(0.5))));
     expect_refused([] { check(correlated({0, 3}, pair(0.5))); }, "0 to 2, got 3");
-    expect_refused([] { check(correlated({0, 2}, pair(0.5))); }, "\"drift of ppp\" is not standard_normal");
+    expect_refused([] { check(correlated({0, 2}, pair(0.5))); }, "\"drift of ppp\" is not normal");
     expect_refused([] { check(correlated({0, 0}, pair(0.5))); }, "\"roll of ppp\" is correlated twice");
     expect_refused([] { check(correlated({0}, pair(0.5))); }, "a row for each of 1 inputs");
     expect_refused([] { check(correlated({0, 1}, pair(1.5))); }, "positive semidefinite");
