@@ -41,9 +41,9 @@ from stepdiag.planning.plan_by_time import (
     Candidate,
     Evaluated,
     Outcome,
+    Setting,
     choose,
     complete,
-    normal,
     outcome,
     own_candidate,
     plan_of,
@@ -66,6 +66,7 @@ REFINED: Final = 2  # plans that are exchanged by exact covariances
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+LineSet = tuple[tuple[str, ...], tuple[str, ...]]  # lines and scale lines
 Rank = tuple[float, ...]  # of two plans, the one with the smaller is the better one
 # Of a candidate, were it as good as the second one.
 Order = Callable[[Candidate, Candidate], Rank]
@@ -100,7 +101,7 @@ class _Search:
         self.scales = _with_others(self.own.scale_lines, _SCALES)
         self.estimates = Estimates(scenario, self.lines, self.scales, faults=self.faults)
         self.exact: dict[Candidate, Outcome] = {}
-        self.on_lines: dict[Candidate, dict[tuple[str, bool], OnLine]] = {}
+        self.on_lines: dict[Setting, dict[tuple[str, bool], OnLine]] = {}
         self.taken: dict[Candidate, tuple[float, float]] = {}
         self.estimated: dict[Candidate, Outcome] = {}
         # Whether more counts than the volume, which is not known where a parameter is not.
@@ -138,7 +139,7 @@ class _Search:
         report(parts, parts)
         return list(self.exact.values())
 
-    def _fastest(self, combined: Sequence[Candidate], starts: Sequence[tuple[tuple[str, ...], ...]]) -> float:
+    def _fastest(self, combined: Sequence[Candidate], starts: Sequence[LineSet]) -> float:
         """The minutes of the fastest plan that reaches the goals, or of the one that comes nearest; the best of each
         setting has been evaluated then."""
         order = self._by_estimates(self.aim)
@@ -164,14 +165,14 @@ class _Search:
             self._exchanged(one.candidate, self._by_evaluations, self._of_estimate())
 
     # --- exchanges ---------------------------------------------------------------------------------------------------
-    def _starts(self) -> list[tuple[tuple[str, ...], ...]]:
+    def _starts(self) -> list[LineSet]:
         sets = [(self.own.lines, self.own.scale_lines), *_STARTS]
         known = {*self.lines}, {*self.scales}
         return [(a, b) for a, b in dict.fromkeys(sets) if known[0] >= {*a} and known[1] >= {*b}]
 
-    def _best(self, setting: Candidate, starts: Sequence[tuple[tuple[str, ...], ...]], order: Order) -> Candidate:
+    def _best(self, setting: Candidate, starts: Sequence[LineSet], order: Order) -> Candidate:
         """Of a setting, from the best of the starts."""
-        found = [normal(replace(setting, lines=lines, scale_lines=scales)) for lines, scales in starts]
+        found = [setting.with_lines(*chosen) for chosen in starts]
         return self._exchanged(min(found, key=lambda one: order(one, one)), order, self._of_whole(order))
 
     def _exchanged(self, candidate: Candidate, order: Order, bound: Bound) -> Candidate:
@@ -208,7 +209,7 @@ class _Search:
         scales = tuple(line for line in self.scales if (line, True) in chosen)
         if not lines or {*lines} & {*scales}:
             return None
-        return normal(replace(setting, lines=lines, scale_lines=scales))
+        return setting.with_lines(lines, scales)
 
     # --- what plans take and give ------------------------------------------------------------------------------------
     def seconds(self, candidate: Candidate) -> float:
@@ -220,14 +221,13 @@ class _Search:
         return self.taken[candidate]
 
     def _in_turn(self, candidate: Candidate) -> tuple[float, float]:
-        setting = replace(candidate, lines=(), scale_lines=())
-        of_lines = self.on_lines.setdefault(setting, {})
+        of_lines = self.on_lines.setdefault(candidate.setting, {})
         chosen = [(line, False) for line in candidate.lines] + [(line, True) for line in candidate.scale_lines]
         for line, is_scale in chosen:
             if (line, is_scale) not in of_lines:
                 # A plan has at least one line that is no scale line.
                 lines = ("ppp",) if is_scale else (line,)
-                plan = plan_of(self.known, replace(candidate, lines=lines, scale_lines=(line,) if is_scale else ()))
+                plan = plan_of(self.known, candidate.with_lines(lines, (line,) if is_scale else ()))
                 runs = runs_of_candidate(self.known, candidate)
                 of_lines[line, is_scale] = on_lines(plan, self.times, repeats=runs, backward=candidate.backward)[line]
         return in_turn([of_lines[one] for one in chosen], self.times)
@@ -300,15 +300,13 @@ class _Search:
             if slack != 1.0:
                 smaller = {kind: u / slack for kind, u in found.largest.items()}
                 found = replace(found, volume=found.volume / slack, largest=smaller)
-            if seconds != found.seconds:
-                found = replace(found, seconds=seconds)
-            return (self._lacking(found), *aim.order(found))
+            return (self._lacking(found), *aim.order(found, seconds))
 
         return order
 
     def _by_evaluations(self, candidate: Candidate, like: Candidate) -> Rank:
         found = self.evaluated(like)
-        return (self._lacking(found), *self.aim.order(replace(found, seconds=self.seconds(candidate))))
+        return (self._lacking(found), *self.aim.order(found, self.seconds(candidate)))
 
     def _by_time(self, candidate: Candidate, like: Candidate) -> Rank:
         return (self._lacking(self.estimate(like)), self.seconds(candidate))

@@ -1,7 +1,6 @@
 """What plans with few steps give, for thousands of choices of lines: from what each line tells, where that is all."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Final
 
 from stepdiag import _core
@@ -38,19 +37,18 @@ class Estimates:
     def _tells(self, candidate: Candidate, between: Callable[[Candidate], float]) -> _core.LineInformation | None:
         """Each line's information with the settings of a candidate; None where lines have more in common than the
         machine, or no run of all of them can be made."""
-        setting = replace(candidate, lines=self.lines, scale_lines=())
-        key = replace(setting, scale_lines=self.scales)
+        key = candidate.with_lines(self.lines, self.scales)
         if key not in self.tells:
             try:
-                self.tells[key] = self._run_of_each(setting, replace(key, lines=(ANY_LINE,)), between(candidate))
+                self.tells[key] = self._run_of_each(key, between(candidate))
             except InvalidArgument:
                 self.tells[key] = None
         return self.tells[key]
 
-    def _run_of_each(self, of_lines: Candidate, of_scales: Candidate, between: float) -> _core.LineInformation:
-        known, run, options = self._planned(of_lines, between)
+    def _run_of_each(self, every: Candidate, between: float) -> _core.LineInformation:
+        known, run, options = self._planned(every.with_lines(self.lines, ()), between)
         tells = _core.LineInformation(run, known.plan, of_run(known.heads), known.chain, known.tool, options, grid=GRID)
-        known, run, options = self._planned(of_scales, between)
+        known, run, options = self._planned(every.with_lines((ANY_LINE,), self.scales), between)
         tells.add(run, known.plan, of_run(known.heads), options)
         return tells
 

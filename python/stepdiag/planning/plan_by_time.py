@@ -43,6 +43,7 @@ KINDS_OF: Final[dict[Family, tuple[Kind, ...]]] = {
     "squareness": ("squareness",),
 }
 ScalePoints = Literal["ends", "steps"]
+Setting = tuple[int, int, int, ScalePoints, bool]  # of a Candidate
 
 # Of two plans whose uncertainties differ by less than this share, the faster one is shown.
 ALIKE: Final = 0.05
@@ -61,6 +62,16 @@ class Candidate:
     """Steps after which the program returns to a line's check point; 0: never."""
     scale_points: ScalePoints = "ends"
     backward: bool = False
+
+    @property
+    def setting(self) -> Setting:
+        """All but the lines."""
+        return self.steps, self.repeats, self.check_points, self.scale_points, self.backward
+
+    def with_lines(self, lines: tuple[str, ...], scale_lines: tuple[str, ...]) -> "Candidate":
+        """The same setting. Without scale lines it does not matter where these are read."""
+        points = self.scale_points if scale_lines else "ends"
+        return Candidate(lines, scale_lines, self.steps, self.repeats, self.check_points, points, self.backward)
 
     @property
     def description(self) -> str:
@@ -178,11 +189,12 @@ class Aim:
         ratios = [one.worst(goal.of) / goal.u if goal.u > 0.0 else math.inf for goal in self.goals]
         return max([1.0, *(rounded(ratio) for ratio in ratios)])
 
-    def order(self, one: Outcome) -> tuple[float, ...]:
-        """Of two plans, the one with the smaller is the better one."""
+    def order(self, one: Outcome, seconds: float | None = None) -> tuple[float, ...]:
+        """Of two plans, the one with the smaller is the better one. `seconds`: in place of its own."""
+        seconds = one.seconds if seconds is None else seconds
         own = (self.missed(one),) if self.goals else (one.undistinguished(self.family), rounded(one.worst(self.family)))
-        over = max(one.seconds - self.minutes * MINUTE, 0.0)
-        return (over, *own, one.seconds)
+        over = max(seconds - self.minutes * MINUTE, 0.0)
+        return (over, *own, seconds)
 
 
 def aim_of(
@@ -203,22 +215,8 @@ def rounded(value: float) -> float:
 def own_candidate(known: Known) -> Candidate:
     """The scenario's own plan."""
     plan, stated = known.plan, known.keys.plan
-    return normal(
-        Candidate(
-            tuple(plan.lines),
-            tuple(plan.scale_lines),
-            plan.steps,
-            stated.repeats,
-            stated.check_points,
-            stated.scale_points,
-            stated.backward,
-        )
-    )
-
-
-def normal(candidate: Candidate) -> Candidate:
-    """Without scale lines it does not matter where these are read."""
-    return candidate if candidate.scale_lines else replace(candidate, scale_points="ends")
+    setting = Candidate((), (), plan.steps, stated.repeats, stated.check_points, stated.scale_points, stated.backward)
+    return setting.with_lines(tuple(plan.lines), tuple(plan.scale_lines))
 
 
 def settings(known: Known) -> list[Candidate]:
@@ -267,10 +265,7 @@ def stated_candidates(scenario: Scenario) -> list[Candidate]:
             "and the like)"
         )
     return list(
-        dict.fromkeys(
-            normal(replace(one, lines=lines, scale_lines=scales))
-            for (lines, scales), one in itertools.product(sets, combined)
-        )
+        dict.fromkeys(one.with_lines(lines, scales) for (lines, scales), one in itertools.product(sets, combined))
     )
 
 
@@ -282,7 +277,7 @@ def plan_of(known: Known, candidate: Candidate) -> _core.Plan:
         order=known.plan.orders,
         scale_lines=list(candidate.scale_lines),
         check_points=_core.CheckPoints(candidate.check_points, min(known.keys.plan.check_point, candidate.steps)),
-        scale_points=normal(candidate).scale_points,
+        scale_points=candidate.scale_points,
         block=min(known.plan.block, candidate.steps),
     )
 

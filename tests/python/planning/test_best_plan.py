@@ -26,7 +26,6 @@ from stepdiag.planning.plan_by_time import (
     choose,
     complete,
     deciding_goal,
-    normal,
     outcome,
     own_candidate,
     plan_of,
@@ -71,11 +70,7 @@ def everything(scenario: Scenario) -> list[Outcome]:
         for scales in itertools.combinations(SCALES, m)
     ]
     combined = [one for one in settings(scenario.known) if one.repeats == 1 or one.scale_points == "ends"]
-    return [
-        outcome(scenario, normal(replace(one, lines=lines, scale_lines=scales)))
-        for one in combined
-        for lines, scales in sets
-    ]
+    return [outcome(scenario, one.with_lines(lines, scales)) for one in combined for lines, scales in sets]
 
 
 AIMS = MappingProxyType(
