@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
 from running_app import PATIENCE, Running
 from small_scenario import SCENARIO
 
@@ -148,6 +148,16 @@ def test_dry_run_says_every_move(person: Person, running: Running) -> None:
     assert len(set(places)) == 4
     slider.press("End")
     assert "line 00p" in said.inner_text()
+
+
+def test_file_chosen_before_the_script_is_there_is_taken(running: Running, person: Person, files: Path) -> None:
+    page, held = person.page, list[Route]()
+    page.route("**/static/app.js", lambda route: held.append(route))
+    page.goto(running.address.split("/enter")[0] + "/machines/VMC%201200", wait_until="commit")
+    page.get_by_label("Drop runs").set_input_files(files / "second.csv")
+    with page.expect_request(lambda asked: asked.method == "POST"):
+        held[0].continue_()
+    page.unroute("**/static/app.js")
 
 
 SCREENS = {

@@ -50,7 +50,13 @@ function dropping() {
     const place = field.closest(".drop");
     const status = place?.querySelector("[role=status]");
     if (!place || !status) continue;
-    field.addEventListener("change", () => void take(field, status, field.files));
+    const chosen = () => {
+      const files = [...(field.files ?? [])];
+      field.value = ""; // so that the same file can be chosen again
+      void take(field, status, files);
+    };
+    field.addEventListener("change", chosen);
+    if (field.files?.length) chosen(); // before this script was there
     place.addEventListener("dragover", (event) => {
       event.preventDefault();
       place.classList.add("over");
@@ -59,7 +65,7 @@ function dropping() {
     place.addEventListener("drop", (event) => {
       event.preventDefault();
       place.classList.remove("over");
-      void take(field, status, /** @type {DragEvent} */ (event).dataTransfer?.files);
+      void take(field, status, [.../** @type {DragEvent} */ (event).dataTransfer?.files ?? []]);
     });
   }
 }
@@ -67,10 +73,10 @@ function dropping() {
 /**
  * @param {HTMLInputElement} field says where files go, and whether what is said of them is shown
  * @param {Element} status
- * @param {FileList | undefined | null} files
+ * @param {File[]} files
  */
 async function take(field, status, files) {
-  for (const file of files ?? []) {
+  for (const file of files) {
     status.textContent = `${file.name} …`;
     const address = `${field.dataset.target}?name=${encodeURIComponent(file.name)}`;
     const answer = await fetch(address, { method: "POST", body: file });
@@ -85,7 +91,7 @@ async function take(field, status, files) {
       return;
     }
   }
-  if (files?.length) location.reload();
+  if (files.length) location.reload();
 }
 
 /**
