@@ -88,6 +88,7 @@ def test_method_page_has_the_tables_of_the_examples() -> None:
     assert by_steps.split("mirror that they take:\n")[1] in page
 
 
+@pytest.mark.slow
 def test_page_on_rechecks_has_the_month_of_the_example(tmp_path: Path) -> None:
     page = (EXAMPLES.parent / "docs" / "verify.md").read_text(encoding="utf-8")
     assert output_of(EXAMPLES / "month_of_a_machine.py", tmp_path) in page

@@ -115,6 +115,7 @@ def test_same_figure_gives_the_same_bytes(suffix: str, monkeypatch: pytest.Monke
         assert mark not in first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_same_bytes_in_another_process(suffix: str) -> None:
     """Hash seeds differ between processes."""

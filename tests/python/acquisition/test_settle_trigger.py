@@ -306,6 +306,7 @@ def taken(raw: Path) -> int:
         return 0  # not written yet
 
 
+@pytest.mark.slow
 def test_run_of_a_program_that_waits_at_each_point_is_acquired(tmp_path: Path) -> None:
     described = scenario()
     points = points_of(described)
@@ -344,6 +345,7 @@ def test_run_of_a_program_that_waits_at_each_point_is_acquired(tmp_path: Path) -
     assert any(record.kind == "settling" for record in values)
 
 
+@pytest.mark.slow
 def test_twin_that_moves_by_itself_is_followed(tmp_path: Path) -> None:
     described = scenario(plan=LINE.replace("ppp", "p00") + "\nbackward = true")
     operator = Listener()

@@ -213,6 +213,7 @@ def test_rows_are_kept_as_they_were_read_and_half_a_row_is_waited_for(tmp_path: 
     assert "; 3 rows of temperatures" in examine(tmp_path / "run.raw.jsonl").summary
 
 
+@pytest.mark.slow
 def test_file_that_stops_growing_is_told_once_and_readings_go_without(tmp_path: Path) -> None:
     described, output, file = scenario(), tmp_path / "run.csv", tmp_path / "t.csv"
     file.write_text("time,temperature_c\n" + row(21.0))

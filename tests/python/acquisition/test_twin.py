@@ -271,6 +271,7 @@ def test_twin_that_plays_stands_at_the_point_where_a_visit_is_begun() -> None:
     np.testing.assert_array_equal(state["position_mm"], visit.positions[4])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("protocol", ["ids3010", "lines"])
 def test_clients_beyond_a_few_are_refused_until_others_leave(protocol: Literal["ids3010", "lines"]) -> None:
     def first_line() -> bytes:

@@ -87,6 +87,7 @@ CASES: dict[str, tuple[dict[Any, Any], dict[str, Any]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_everything_is_that_of_the_dense_adjustment(case: str) -> None:
     setup, given = CASES[case]

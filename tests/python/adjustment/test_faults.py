@@ -39,6 +39,7 @@ def long_run() -> tuple[sd.Measurement, reference.Scenario]:
     return run_of(31, roughness=0.0, steps=50)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_two_outliers_of_twenty_sigma_are_found_and_named(
     long_run: tuple[sd.Measurement, reference.Scenario], seed: int
@@ -210,6 +211,7 @@ def told(layout: str = "ideal") -> tuple[sd.Measurement, reference.Scenario, ref
 SOUND = 4.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.05, 1.0])
 def test_slip_of_a_body_diagonal_is_a_class_with_its_twin_and_rejected(size: float) -> None:
     run, scenario, table = told()
@@ -249,6 +251,7 @@ def test_end_of_a_scale_line_may_be_any_of_the_three_or_a_factor_of_a_diagonal()
     assert normalised(large, table) < SOUND
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 @pytest.mark.parametrize("size", [9.0, 1000.0, -400.0])
 def test_gross_distance_is_found_and_does_no_harm(layout: str, size: float) -> None:
@@ -300,6 +303,7 @@ def test_consecutive_rows_that_are_off_are_two_slips() -> None:
     assert normalised(adjustment, table) < SOUND
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["ppp", "nnp"])
 @pytest.mark.parametrize("size", [1e-3, 9e-3])
 def test_tilts_that_are_off_from_point_1_on_are_not_taken_for_a_wrong_first_one(line: str, size: float) -> None:

@@ -34,6 +34,7 @@ def fixed_drift(layout: str) -> dict[str, object]:
     return {"knowledge": knowledge}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 @pytest.mark.parametrize("chain", ALL_CHAINS[::4])
 @pytest.mark.parametrize("at", [0, 2])

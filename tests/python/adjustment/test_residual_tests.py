@@ -135,6 +135,7 @@ def test_a_trend_has_the_size_that_it_has_as_an_unknown_and_then_leaves_none() -
     assert (free.verdict.fit, free.verdict.reasons) == ("accepted", [])
 
 
+@pytest.mark.slow
 def test_sound_runs_raise_no_alarms_beyond_what_is_stated() -> None:
     fits = Counter(adjust(noisy(ONCE, seed)).verdict.fit for seed in range(400))
     assert fits["rejected"] == 0
@@ -174,6 +175,7 @@ def test_what_was_weighed_by_channel_is_not_scaled_again() -> None:
     assert scaled.calibration.squareness == plain.calibration.squareness
 
 
+@pytest.mark.slow
 def test_scaling_restores_the_coverage_of_noise_that_is_larger_by_one_factor() -> None:
     """Squarenesses of 100 runs with noise 1.4 times what is stated: 300 deviations in units of their uncertainty."""
     exact = adjust(ONCE).calibration.squareness

@@ -166,6 +166,7 @@ def angles_known_to(size: float) -> dict[str, Any]:
     return {"setup": sd.methods.SetupPriors(laser=size, reflector=size)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plan", "draw", "told", "seconds"),
     [
@@ -198,6 +199,7 @@ def test_intervals_cover_the_truth(plan: sd.Plan, draw: Draw, told: dict[str, An
         assert np.mean(found) >= 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / (2 * runs)), family
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "laser", "mirror", "scale_points"),
     [

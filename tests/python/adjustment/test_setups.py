@@ -105,6 +105,7 @@ def test_constants_of_beams_are_found_where_the_laser_is_known() -> None:
     assert_set_ups(adjustment, truth_of(scenario, table), {"beam_constants": 1e-9, "distance_constant": 1e-9})
 
 
+@pytest.mark.slow
 def test_a_set_up_for_every_run_or_one_for_the_line() -> None:
     """Two runs, the second one set up anew: with one set-up for both the residuals say that this is wrong."""
     rng = np.random.default_rng(44)
@@ -173,6 +174,7 @@ def test_reversal_of_every_function_is_recovered(layout: str) -> None:
     assert error.angle <= limit[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "scale_lines"),
     [

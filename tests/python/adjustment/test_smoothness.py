@@ -14,6 +14,7 @@ import stepdiag as sd
 from stepdiag.parameters import FUNCTIONS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("translation", "rotation"), [(1e-3, 3e-6), (5e-3, 0.0), (0.0, 1e-6)])
 def test_smoothness_is_the_dense_adjustment_with_rows_of_second_differences(
     translation: float, rotation: float
@@ -52,6 +53,7 @@ def smooth_machine(seed: int, steps: int, screw: float) -> tuple[reference.Scena
     return scenario, reference.ErrorTable(functions, {"C0Y": 20e-6, "B0Z": -30e-6, "A0Z": 10e-6}), pitch
 
 
+@pytest.mark.slow
 def test_cross_validation_finds_smooth_axes_and_keeps_the_screw() -> None:
     """2 um of a 10 mm pitch at 0.1 um and 1 urad of noise: it stays, and the smooth functions get better."""
     screw = 2e-3

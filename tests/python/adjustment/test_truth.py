@@ -24,6 +24,7 @@ from virtual_runs import head_of, measured, plan_of, random_scenario, random_tab
 import stepdiag as sd
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 def test_random_machines_are_recovered(layout: str, seed: int) -> None:
@@ -44,6 +45,7 @@ def test_fifty_steps_an_axis_are_recovered(layout: str) -> None:
     assert_recovered(adjust(run, scenario, knowledge_of(layout)), table, LIMIT[layout])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ALL_CHAINS)
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 def test_scale_lines_read_at_every_step_are_recovered(layout: str, chain: str) -> None:

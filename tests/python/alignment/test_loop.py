@@ -100,6 +100,7 @@ def aligned(described: Scenario, twin: Twin, lines: list[str]) -> tuple[Hand, di
     return hand, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("head", [BEAMS, IDEAL, 'layout = "psd"\npsd_distance_mm = 80.0'])
 def test_lines_are_aligned_after_what_was_said_is_done(head: str) -> None:
     described = misaligned(head)

@@ -219,6 +219,7 @@ def test_words_of_a_form_are_no_options(person: TestClient) -> None:
 
 
 # --- what it is for --------------------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_path_from_a_new_machine_to_the_report(person: TestClient, book: Path) -> None:
     form = {"name": "Fräse 3", "limit": "60", "title": "VMC 800", "head": "beam_and_psd", "chain": "[w X' Y' b Z t]"}
     form |= {"travel_x": "400", "travel_y": "300", "travel_z": "250.5", "distance_noise": "0.2", "tilt_noise": "2"}
@@ -276,6 +277,7 @@ def test_failure_of_a_command_is_shown(person: TestClient) -> None:
     assert "exists already" in person.get(answer.headers["location"]).text
 
 
+@pytest.mark.slow
 def test_long_command_can_be_stopped(person: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stepdiag.app.jobs.COMMAND", ("-c", "import time; time.sleep(60)"))
     answer = person.post("/machines/VMC-1200/evaluate", data={"run": "runs/run.csv"})

@@ -177,6 +177,7 @@ def test_bad_options_of_the_twin_are_refused(
     assert message in refused(capsys, "twin", "scenario.toml", *arguments)
 
 
+@pytest.mark.slow
 def test_twin_on_standard_output_is_acquired_and_ends_with_the_acquisition(folder: Path) -> None:
     head = 'layout = "psd"\npsd_distance_mm = 80.0'
     (folder / "psd.toml").write_text(acquiring.SCENARIO.format(plan='lines = ["ppp"]\nsteps = 1', head=head, noise=""))

@@ -35,6 +35,7 @@ def status(command: str, closed: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", CLOSED)
 def test_evaluate_writes_the_same_calibration(here: Path, monkeypatch: pytest.MonkeyPatch, closed: str) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
@@ -47,6 +48,7 @@ def test_evaluate_writes_the_same_calibration(here: Path, monkeypatch: pytest.Mo
         assert Path(name).read_bytes() == Path(f"open_{name}").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", CLOSED)
 @pytest.mark.parametrize(
     ("command", "code"),

@@ -127,6 +127,7 @@ def without_truth(scenario: str) -> str:
     return tomlkit.dumps(content)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["conventional", "enhanced", "adjustment"])
 @pytest.mark.parametrize("case", CASES)
 def test_calibration_has_the_same_bytes_when_the_truth_is_deleted(case: str, method: str, tmp_path: Path) -> None:

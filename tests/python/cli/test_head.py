@@ -34,6 +34,7 @@ def test_list_names_the_shipped_heads_and_their_files(capsys: pytest.CaptureFixt
 
 
 # --- show ------------------------------------------------------------------------------------------------------------
+@pytest.mark.slow
 @pytest.mark.parametrize("head", HEADS)
 def test_show_draws_the_same_bytes_again(head: str) -> None:
     for suffix in ("png", "svg"):
@@ -132,6 +133,7 @@ def far_plates(count: int) -> str:
     return find_head("three_beams").read_text() + "\n[limits]\nmost_hits = 1000\n" + places
 
 
+@pytest.mark.slow
 def test_head_that_reaches_far_is_looked_at_from_farther(capsys: pytest.CaptureFixture[str]) -> None:
     Path("far.toml").write_text(far_plates(60))
     assert run("head", "check", "far.toml") == 0

@@ -25,6 +25,7 @@ HOSTILE = {
 ACTING = ("\x1b", "\x07", "\u202e", "\u2028")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_names_and_texts_stay_texts(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

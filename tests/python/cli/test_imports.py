@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from places import EXAMPLES
 
 import stepdiag as sd
@@ -38,6 +39,7 @@ def test_evaluating_to_csv_imports_no_netcdf_and_no_search_that_is_not_made(tmp_
     assert imported_of(modules, "evaluate", scenario, run, "-o", tmp_path / "calibration.csv") == ""
 
 
+@pytest.mark.slow
 def test_netcdf_files_need_neither_xarray_nor_pandas(tmp_path: Path) -> None:
     scenario, run, calibration = EXAMPLES / "scenario.toml", tmp_path / "run.nc", tmp_path / "calibration.nc"
     modules = "xarray pandas matplotlib dask scipy"

@@ -66,6 +66,7 @@ def started(stop: str, patch: str, *arguments: str) -> "subprocess.Popen[str]":
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", STATUS)
 @pytest.mark.parametrize(
     ("stop", "patch", "arguments"),

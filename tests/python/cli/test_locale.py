@@ -41,6 +41,7 @@ def locales(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_decimal_comma_changes_nothing(tmp_path: Path, locales: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1795252980")
     monkeypatch.setenv("LOCPATH", str(locales))

@@ -240,6 +240,7 @@ def test_every_option_that_writes_is_known_here() -> None:
     assert reads == INPUTS | APPENDED
 
 
+@pytest.mark.slow
 @every_way
 def test_what_is_of_another_kind_is_not_replaced(
     way: Way, made: Made, folder: Path, capsys: pytest.CaptureFixture[str]
@@ -290,6 +291,7 @@ def test_unknown_endings_are_refused(way: Way, folder: Path, capsys: pytest.Capt
         assert way.ending in said
 
 
+@pytest.mark.slow
 @every_way
 def test_older_result_is_replaced_where_it_can_be_computed_again(
     way: Way, made: Made, folder: Path, capsys: pytest.CaptureFixture[str]
@@ -314,6 +316,7 @@ def test_older_result_is_replaced_where_it_can_be_computed_again(
         assert way.out.read_bytes() == made.own[way]
 
 
+@pytest.mark.slow
 @every_way
 def test_empty_file_is_no_loss(way: Way, made: Made, folder: Path) -> None:
     if NOBODY[1] in way.arguments or "--from-raw" in way.arguments:

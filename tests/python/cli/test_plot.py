@@ -71,6 +71,7 @@ EVERY_KIND = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("files", EVERY_KIND)
 def test_every_kind_is_drawn_with_the_same_bytes_twice(files: str, here: Path) -> None:
     assert main(["plot", *files.split(), "-o", "one.png"]) == 0
@@ -79,6 +80,7 @@ def test_every_kind_is_drawn_with_the_same_bytes_twice(files: str, here: Path) -
     assert Path("one.png").read_bytes() == Path("two.png").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["svg", "pdf"])
 def test_vector_files_have_the_same_bytes_twice(suffix: str, here: Path) -> None:
     for name in ("one", "two"):
@@ -111,6 +113,7 @@ def test_pictures_of_others_are_not_replaced_unless_named(here: Path, capsys: py
     assert main(["plot", "a.csv", "-o", "a.png"]) == 0
 
 
+@pytest.mark.slow
 def test_rejected_fit_ends_with_code_3_and_a_marked_figure(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in (["bad.csv"], ["a.csv", "bad.csv"], ["bad.csv", "--volume"]):
         assert main(["plot", *arguments, "-o", "bad.svg"]) == 3
@@ -163,6 +166,7 @@ def test_importing_the_package_imports_no_matplotlib() -> None:
     subprocess.run([sys.executable, "-c", text], check=True)
 
 
+@pytest.mark.slow
 def test_picture_has_the_size_of_its_figure(here: Path) -> None:
     from PIL import Image
 

@@ -55,6 +55,7 @@ def test_without_samples_the_propagation_is_told_with_its_budget(
     assert "Monte Carlo" not in said
 
 
+@pytest.mark.slow
 def test_budget_names_what_matters_most(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (SCENARIO + UNCERTAIN).replace("half_width = 2.0", "half_width = 2000.0")
     Path("scenario.toml").write_text(text)
@@ -205,6 +206,7 @@ def ctrl_c(*_: Any) -> None:
     raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["nc", "csv"])
 @pytest.mark.parametrize(
     ("failure", "status", "said"), [(disk_full, 2, "No space left on device"), (ctrl_c, 130, "interrupted")]

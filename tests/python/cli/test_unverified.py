@@ -87,6 +87,7 @@ def warnings_of(command: str, edited: str, capsys: pytest.CaptureFixture[str], c
     return [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edited", [EDITED, "edited.nc"])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_command_says_it_and_ends_with_status_3(
@@ -104,6 +105,7 @@ def test_command_that_needs_a_covariance_says_it(here: Path, capsys: pytest.Capt
     assert any(line.startswith("warning: edited.nc: unverified: ") for line in warned)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [command for command in (*COMMANDS, *ON_NETCDF) if re.search(r"out\S*$", command)])
 def test_what_is_written_says_it(here: Path, capsys: pytest.CaptureFixture[str], command: str) -> None:
     warnings_of(command, "edited.nc", capsys, 3)

@@ -40,6 +40,7 @@ def made(folder: Path, text: str, chain: str = CHAIN, **options: Any) -> sd.Comp
     return sd.Compensator(path, chain, **({"temperatures": (0.0, 40.0)} | options))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ALL_CHAINS)
 def test_answers_of_every_chain_are_those_of_the_conventions(tmp_path: Path, chain: str) -> None:
     text = table(ALL_CHAINS.index(chain), chain)

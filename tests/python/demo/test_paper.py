@@ -176,6 +176,7 @@ def test_every_file_is_sound(demo: Path, capsys: pytest.CaptureFixture[str]) -> 
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["1b", "3", "4"])
 def test_commands_go_on_from_the_files_with_the_same_tables(demo: Path, case: str, tmp_path: Path) -> None:
     scenario, run = str(demo / case / "scenario.toml"), str(demo / case / "run.csv")
@@ -200,6 +201,7 @@ def test_commands_go_on_from_the_files_with_the_same_tables(demo: Path, case: st
         assert plain == made
 
 
+@pytest.mark.slow
 def test_demo_makes_the_same_bytes_again(demo: Path, tmp_path: Path) -> None:
     assert main(["demo", "-o", str(tmp_path / "again")]) == 0
     files = [path.relative_to(demo) for path in sorted(demo.rglob("*")) if path.is_file()]

@@ -68,6 +68,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_every_way_gives_the_same_verdict(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     RUNS[name](sd.simulate(sd.read_scenario("scenario.toml"))).write("run.csv")

@@ -38,6 +38,7 @@ def with_distance(run: sd.Measurement, spoil: Spoil) -> sd.Measurement:
     return sd.Measurement(run.line, run.point.tolist(), run.position, channels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     ("spoil", "message"),
@@ -62,6 +63,7 @@ def test_distances_in_another_unit_are_an_error_that_names_it(
     assert not Path("calibration.csv").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("size", [1.0, 1e6, 1e308, -1e308])  # 0 is a lost beam
 def test_one_absurd_reading_is_named(
@@ -93,6 +95,7 @@ def test_another_volume_is_an_error_that_tells_its_edge(
     refused(sd.methods.evaluate_scenario, other, moved, method=method, names="the readings fit a travel of ")
 
 
+@pytest.mark.slow
 def test_limits_are_those_of_the_scenario(run: sd.Measurement, capsys: pytest.CaptureFixture[str]) -> None:
     run.write("run.csv")
     for key, limit, message in (

@@ -12,6 +12,7 @@ import stepdiag as sd
 from stepdiag.parameters import FUNCTIONS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "scale_lines"),
     [
@@ -36,6 +37,7 @@ def test_evaluation_determines_what_the_rank_allows(lines: list[str], scale_line
     assert_claims_are_the_rank(setup, [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_lost_readings_are_bridged_where_the_rank_allows(seed: int) -> None:
     setup = Setup(steps=3, lines=DIAGONALS, scale_lines=SCALE_LINES, tool=(10.0, -20.0, 60.0))

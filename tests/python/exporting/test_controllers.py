@@ -39,6 +39,7 @@ def test_directions_are_said(tmp_path: Path) -> None:
     assert any("direction of approach +" in line for line in one)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ALL_CHAINS)
 @pytest.mark.parametrize("to", INTERPRETERS)
 def test_what_is_left_is_what_the_export_says(tmp_path: Path, to: str, chain: str) -> None:

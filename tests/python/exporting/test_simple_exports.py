@@ -98,6 +98,7 @@ def test_no_other_three_angles_leave_a_smaller_rms_error(tmp_path: Path, chain: 
     assert done.values["with_fitted"].with_it.rms < 1.02 * min(done.left.with_it.rms, done.left.without.rms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ALL_CHAINS)
 def test_no_other_matrix_leaves_a_smaller_rms_error(tmp_path: Path, chain: str) -> None:
     """The weighted sum of what the model leaves times each of its terms is 0: the normal equations."""

@@ -50,6 +50,7 @@ def test_curves_are_standard_uncertainties_and_bars_are_shares_of_the_variance(
     np.testing.assert_allclose(heights[:, column], expected, rtol=1e-9, atol=1e-12)  # of 100: rounding
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [None, "u.nc", "u.csv"])
 @pytest.mark.parametrize(
     ("section", "words"),

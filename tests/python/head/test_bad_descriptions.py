@@ -236,6 +236,7 @@ values = st.one_of(scalars, st.lists(scalars, max_size=4), st.lists(st.floats(-1
                    st.dictionaries(st.sampled_from(["shape", "sensor", "x"]), scalars, max_size=2))  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(path=st.sampled_from(paths_of(tomlkit.parse(BLOCK).unwrap())), value=values)
 def test_whatever_stands_at_a_key_is_read_or_refused(path: tuple[str, ...], value: Any) -> None:

@@ -223,6 +223,7 @@ def test_cramer_rao_bound_is_the_inverse_of_the_information(read_noise: float) -
     assert bound == pytest.approx(float(exact), rel=1e-4 if read_noise else 1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [2.0, 3.0, 5.0, 10.0, 20.0])
 @pytest.mark.parametrize("electrons", [1e3, 1e4, 1e5, 1e6])
 @pytest.mark.parametrize("read_noise", [0.0, 1.5])

@@ -81,6 +81,7 @@ def test_beams_through_wedge_and_plate_hold_against_forty_digits(
         assert abs(float(here - there) - (signals[i] - aligned[i])) <= 5e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shipped", SHIPPED, ids=lambda shipped: shipped.file)
 @settings(max_examples=40)
 @given(st.integers(0, 2**32), tilts, distances)

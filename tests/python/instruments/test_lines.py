@@ -134,6 +134,7 @@ def acquired(described: Scenario, source: str, output: Path, *, options: Acquire
     return acquire(described, source, output, trigger=KeyTrigger(), options=options or fast(), operator=Listener())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("head", [PSD, IDEAL, BEAMS, DESCRIBED], ids=["psd", "ideal", "multi_beam", "described"])
 def test_run_of_any_layout_is_the_simulated_one_and_is_evaluated(tmp_path: Path, head: str) -> None:
     described = scenario(plan=LINES, head=head, noise=NOISE)
@@ -342,6 +343,7 @@ def test_adapter_that_stops_is_not_waited_for(tmp_path: Path) -> None:
         acquired(scenario(head=PSD), source, tmp_path / "run.csv")
 
 
+@pytest.mark.slow
 def test_adapter_that_sends_without_end_is_stopped(tmp_path: Path) -> None:
     """`yes` writes faster than lines can be taken: nothing is kept, and the reason is told."""
     script = f"echo {shlex.quote(json.dumps(HEADER))}; exec yes {shlex.quote(json.dumps(SAMPLE))}"

@@ -166,6 +166,7 @@ def test_measurement_with_one_thing_wrong_is_refused(folder: Path, tmp_path: Pat
     refused(sd.read_measurement, bad, names=names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "names"), [case[1:] for case in BAD_CALIBRATIONS], ids=[c[0] for c in BAD_CALIBRATIONS]
 )

@@ -273,6 +273,7 @@ def test_file_is_replaced_with_its_permissions_behind_its_link(tmp_path: Path) -
     assert len(os.listdir(tmp_path)) == 2
 
 
+@pytest.mark.slow
 def test_threads_read_and_write_at_once(tmp_path: Path, adjustment: tuple[sd.Adjustment, sd.Measurement]) -> None:
     """HDF5 crashes where two threads use it at once."""
     calibration = adjustment[0].calibration

@@ -41,11 +41,13 @@ def ended(command: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reader", [*CSV_READERS, sd.read_scenario, sd.optics.read_head_design])
 def test_reader_refuses_a_pipe_without_a_writer(here: Path, reader: Callable[[str], Any]) -> None:
     refused(reader, "pipe", names=f"pipe: {NO_WRITER}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -40,6 +40,7 @@ def mirrored(head: str, axes: str, *, scale_lines: bool) -> sd.Measurement:
     return sd.Measurement(lines, run.point.tolist(), position, dict(run.channels))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_lines", [False, True])
 @pytest.mark.parametrize("axes", ["X", "Y", "Z", "XY", "XZ", "YZ", "XYZ"])
 @pytest.mark.parametrize("head", ["ideal", "psd", "multi_beam"])

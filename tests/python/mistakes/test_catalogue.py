@@ -124,6 +124,7 @@ def scale_lines_scaled(run: sd.Measurement) -> sd.Measurement:
     return changed(run, {"distance": run.channels["distance"] * factors})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("entry", "head", "make", "words"), CASES, ids=[f"{c[0]}-{c[1]}-{c[3][:40]}" for c in CASES])
 def test_mistake_is_named(entry: str, head: str, make: Make, words: str) -> None:
     scenario = described(head, steps=STEPS)

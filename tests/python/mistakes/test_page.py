@@ -43,6 +43,7 @@ MADE: list[Callable[[sd.Measurement], sd.Measurement]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(len(MADE)))
 def test_page_says_what_the_program_says(number: int) -> None:
     scenario = sd.read_scenario(EXAMPLES / "scenario.toml")

@@ -34,6 +34,7 @@ def test_quick_fit_is_that_of_the_adjustment(head: str) -> None:
     assert enough.weighted_square_sum == pytest.approx(quick.weighted_square_sum, abs=0.1)  # of gains of 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("head", HEADS)
 @pytest.mark.parametrize("noise", [1.0, 1.5, 4.0])
 def test_nothing_is_named_where_there_is_no_mistake(head: str, noise: float) -> None:
@@ -174,6 +175,7 @@ def test_of_many_alternatives_some_are_counted() -> None:
     assert text.startswith("either alpha has the wrong sign; or alpha has the wrong sign; or one of 3 more; with")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("few", [True, False])
 def test_mistakes_of_many_runs_are_those_of_all(few: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is screened by two of six runs is named as by all six: in all, in one of them, with a number of its own."""

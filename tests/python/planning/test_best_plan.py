@@ -134,6 +134,7 @@ def test_estimates_are_of_as_many_steps_as_the_mirror_allows() -> None:
     assert search.estimate(replace(search.own, steps=50)).volume < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_lines")
 def test_power_against_faults_is_a_merit() -> None:
     scenario = parse_scenario(NOISY + "[plan_by_time]\nsteps = [4]\nrepeats = [1, 2]\nline_change_min = 2.0\n")

@@ -70,6 +70,7 @@ def test_data_name_the_kind_and_leave_out_how_a_terminal_aligns() -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "command"),
     [

@@ -99,6 +99,7 @@ def test_one_common_factor_on_the_noise_is_doubtful_and_not_rejected(folder: Pat
     assert sd.read_calibration("calibration.csv").fit == "doubtful"
 
 
+@pytest.mark.slow
 def test_a_common_factor_above_three_is_rejected_as_noise(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_run(change=noisy(5.0))
     assert evaluate() == 3
@@ -178,6 +179,7 @@ def test_scaled_uncertainties_are_said_in_reports_and_files(folder: Path, capsys
         assert f"all standard uncertainties were multiplied by {factor:.3g}" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_false_alarms_are_as_rare_as_the_limits_say(folder: Path) -> None:
     write_run()
     scenario, verdicts = sd.read_scenario("scenario.toml"), []

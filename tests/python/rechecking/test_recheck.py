@@ -221,6 +221,7 @@ def test_wrong_reading_is_named_and_left_out(folder: Path, capsys: pytest.Captur
     assert abs(fault["size"]["value"] - 1e3 * wrong) < 5.0 * fault["size"]["standard_uncertainty"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", rechecked.LAYOUTS)
 @pytest.mark.parametrize("event", rechecked.EVENTS)
 def test_whatever_happened_is_judged(event: str, layout: str) -> None:
@@ -243,6 +244,7 @@ def test_whatever_happened_is_judged(event: str, layout: str) -> None:
             assert verified.probability >= ALPHA
 
 
+@pytest.mark.slow
 def test_fit_refuses_as_many_unchanged_machines_as_it_says() -> None:
     """Of 300 machines 5 %, within four binomial standard deviations."""
     probabilities = []

@@ -256,6 +256,7 @@ values = st.one_of(scalars, st.lists(scalars, max_size=4), st.lists(st.lists(num
                    st.dictionaries(st.sampled_from(["ppp", "p00", "seed", "x"]), scalars, max_size=2))  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(path=st.sampled_from(paths_of(tomlkit.parse(GOOD).unwrap())), value=values)
 def test_whatever_stands_at_a_key_is_read_or_refused(path: tuple[str, ...], value: Any) -> None:

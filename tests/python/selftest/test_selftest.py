@@ -53,6 +53,7 @@ WRONG = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "right", "wrong", "case"), WRONG, ids=lambda text: text[-20:])
 def test_a_changed_truth_fails(known: Path, name: str, right: str, wrong: str, case: str) -> None:
     text = (known / name).read_text()
@@ -63,6 +64,7 @@ def test_a_changed_truth_fails(known: Path, name: str, right: str, wrong: str, c
     assert {row.case for row in again.rows if not row.passed} == {case}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(path.name for path in (KNOWN / "runs").iterdir() if path.is_dir()))
 def test_a_changed_error_of_a_machine_fails(known: Path, case: str) -> None:
     path = known / "runs" / case / "truth.csv"
@@ -101,6 +103,7 @@ def chosen() -> Iterator[None]:
     _core.choose_instruction_set(before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", _core.instruction_sets())
 @pytest.mark.usefixtures("chosen")
 def test_every_instruction_set_passes(name: str) -> None:

@@ -17,6 +17,7 @@ def assert_rms(family: str, z: np.ndarray) -> None:
     assert abs(np.mean(z**2) - 1.0) <= 5.0 * np.sqrt(2.0 / len(z)), family
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOLD)
 def test_intervals_cover_the_truth_where_the_model_holds(name: str) -> None:
     z = outcomes(CASES[name], range(MACHINES))
@@ -29,6 +30,7 @@ def test_intervals_cover_the_truth_where_the_model_holds(name: str) -> None:
         assert coverage.lowest >= 0.95 - 1.375 * coverage.tolerance, (family, coverage)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(coverage_propagated.CASES))
 def test_propagated_intervals_cover_the_truth(name: str) -> None:
     """Fewer machines: each takes some sixty derivatives of whole calibrations."""

@@ -42,6 +42,7 @@ def cluster(credentials: dict[str, str], tmp_path_factory: pytest.TempPathFactor
         yield cluster.scheduler_address
 
 
+@pytest.mark.slow
 def test_scheduler_with_tls_finds_its_credentials_in_the_environment(
     cluster: str, credentials: dict[str, str], here: Path
 ) -> None:

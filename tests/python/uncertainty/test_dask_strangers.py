@@ -132,6 +132,7 @@ def test_strangers_run_nothing_anywhere(two: Workers, tmp_path: Path, scheme: st
     assert [answer for _, answer in two.compute(abs, [(-1,), (-2,)])] in ([1, 2], [2, 1]), "still at work"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["tcp", "tls"])
 def test_strangers_are_neither_clients_nor_workers(two: Workers, tmp_path: Path, scheme: str) -> None:
     address = two.address.replace("tls", scheme)

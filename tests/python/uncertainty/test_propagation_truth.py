@@ -150,6 +150,7 @@ def order_of(calibrations: Any, labels: list[tuple[str, float]]) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["enhanced", "adjustment"])
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 def test_inputs_act_as_differences_of_whole_calibrations_say(layout: str, method: str) -> None:

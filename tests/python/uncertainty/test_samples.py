@@ -80,6 +80,7 @@ def assert_readings_are(found: np.ndarray, rows: list[dict[str, Any]], channels:
         assert largest <= TOLERANCE.get(name, DISTANCE_TOLERANCE), (name, largest)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 @pytest.mark.parametrize("plan", [{}, {"backward": True}, {"backward": True, "scale_points": "steps", "block": 2}])
 def test_readings_of_a_sample_are_those_of_the_closed_forms(layout: str, plan: dict[str, Any]) -> None:
@@ -94,6 +95,7 @@ def test_readings_of_a_sample_are_those_of_the_closed_forms(layout: str, plan: d
         assert_readings_are(np.asarray(calibrations.readings(sample)), sampled.rows(), channels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 def test_every_input_acts_by_itself(layout: str) -> None:
     """One uncertain input at a time, so that none hides behind others."""
@@ -115,6 +117,7 @@ def test_every_input_acts_by_itself(layout: str) -> None:
         assert np.max(np.abs(found - nominal)) > 1e-9, f"{one.name} does nothing"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["enhanced", "adjustment"])
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
 @pytest.mark.parametrize("scale_points", ["ends", "steps"])

@@ -249,6 +249,7 @@ def test_interruption_of_the_command_gives_130_and_says_how_to_go_on(
 
 
 # --- elsewhere -------------------------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_study_on_workers_is_that_of_this_process(folder: Path) -> None:
     study = read_study("study.toml")
     here = run_study(study, FinishedCells(folder / "here.cells", resume=False))

@@ -261,6 +261,7 @@ def test_unverified_calibration_is_not_called_valid(evaluated: Path) -> None:
     assert "Is this calibration valid? Not known. The readings agree" in page.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fit", ["accepted", "doubtful", "unchecked", "rejected"])
 def test_what_is_not_valid_is_stamped_on_screen_and_on_paper(fit: str, evaluated: Path) -> None:
     sd.read_calibration("calibration.nc").judged(fit, ["x"]).write("judged.nc")
