@@ -180,7 +180,7 @@ def plot(picture: Path) -> None:
 def run_peers(build: Path) -> None:
     own = build.parents[1] / "peers-venv/bin/python"
     for name in ("adjustment", "compensator", "uncertainty", "peers"):
-        python = own if name == "peers" else Path(sys.executable)
+        python = own if name in ("uncertainty", "peers") else Path(sys.executable)
         print(f"\n== benchmarks/peers/{name}.py", flush=True)
         if python.exists():
             subprocess.run([python, ROOT / f"benchmarks/peers/{name}.py", "--build", build], check=True)

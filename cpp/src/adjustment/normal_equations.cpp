@@ -42,6 +42,11 @@ void NormalEquations::Row::add_to(Side v, double times) const {
         if (unknown[i] != no_unknown) v[unknown[i]] += times * derivative[i];
 }
 
+void NormalEquations::Row::add_to(BorderedFactor::Sides& v, const BorderedFactor::OfSides& times) const {
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] != no_unknown) v.row(unknown[i]) += times * derivative[i];
+}
+
 NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&problem) {
     for (const LineSetup& setup : problem.setups()) models_.push_back(setup.model);
     std::size_t weights = 0, most = 0;

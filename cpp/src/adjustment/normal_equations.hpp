@@ -87,6 +87,7 @@ public:
 
         double product(const Eigen::VectorXd& v) const;
         void add_to(Side v, double times) const;
+        void add_to(BorderedFactor::Sides& v, const BorderedFactor::OfSides& times) const;
     };
     Row row(const AdjustedPoint& point, int reading) const;
     Row row(int reading) const { return row(point(reading), reading); }

@@ -76,8 +76,9 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
 
 std::vector<ReadingResidual> residuals_by_row(const NormalEquations& equations, const Eigen::VectorXd& variances) {
     std::vector<ReadingResidual> residuals = reading_residuals(equations, variances);
-    std::stable_sort(residuals.begin(), residuals.end(),
-                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
+    const auto is_before = [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; };
+    if (!std::is_sorted(residuals.begin(), residuals.end(), is_before))
+        std::stable_sort(residuals.begin(), residuals.end(), is_before);
     return residuals;
 }
 
@@ -149,9 +150,12 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.machine_drift = drift_estimates(problem, x, inverse);
     result.rounded = problem.rounded();
     result.residuals = residuals_by_row(solver.equations(), solution->reading_variances());
-    const ResidualsByNoise by_noise = [&] {
-        return residuals_by_row(solver.equations(),
-                                solution->reading_variances() + solver.equations().prior_shares(inverse));
+    std::vector<ReadingResidual> found_by_noise;
+    const ResidualsByNoise by_noise = [&]() -> const std::vector<ReadingResidual>& {
+        if (found_by_noise.empty())
+            found_by_noise = residuals_by_row(solver.equations(),
+                                              solution->reading_variances() + solver.equations().prior_shares(inverse));
+        return found_by_noise;
     };
     for (const ScatterOfChannel& each : found.scatter) result.variance_components.push_back(each.component);
     result.combinations = known_combinations(observability, x, inverse);

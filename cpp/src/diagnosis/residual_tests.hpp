@@ -30,7 +30,7 @@ struct ResidualPattern {
 };
 
 // An adjustment's residuals again, with the redundancies that they owe to noise alone (NormalEquations).
-using ResidualsByNoise = std::function<std::vector<ReadingResidual>()>;
+using ResidualsByNoise = std::function<const std::vector<ReadingResidual>&()>;
 
 // All readings together, where they scatter less than stated.
 ResidualPattern less_noise(const std::vector<ReadingResidual>& residuals, const ResidualsByNoise& by_noise);

@@ -93,8 +93,7 @@ Draws responses(const Solution& solution, const std::vector<int>& readings) {
     static_assert(draws % sides == 0, "draws are solved for side by side");
     for (int first = 0; first < draws; first += sides) {
         BorderedFactor::Sides x = BorderedFactor::Sides::Zero(solution.problem().size(), sides);
-        for (const int r : readings)
-            for (int side = 0; side < sides; ++side) equations.row(r).add_to(x.col(side), z(r, first + side));
+        for (const int r : readings) equations.row(r).add_to(x, z.row(r).segment<sides>(first));
         solution.solver().factor().solve(x);
         z.middleCols<sides>(first) -= equations.images(x).topRows(z.rows());
     }
