@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from stepdiag._core import Calibration, InvalidArgument, read_error_map
+from stepdiag._core import InvalidArgument, read_error_map
 from stepdiag.cli.in_book import Kept, OfMachine
 from stepdiag.cli.options import (
     NOT_TO_BE_TRUSTED,
@@ -22,6 +23,9 @@ from stepdiag.cli.options import (
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
 from stepdiag.progress import Progress
+
+if TYPE_CHECKING:
+    from stepdiag.presentation.page.contents import Contents
 
 _WORDS = {
     "number": "Number of the report or certificate.",
@@ -131,9 +135,9 @@ def report(
         raise InvalidArgument("`workpiece_expansion`, `workpiece_temperature`: expected both, got one")
     calibration = calibrations[-1]
     path = None if functional_point is None else functional_point.claim(*calibrations)
-    before = None
+    page = None
     if output is not None:
-        before = _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, language, words)
+        page = _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, language, words)
     else:
         given = {"scenario": scenario, "run": run, "uncertainty": uncertainty, "limit": limit, "logo": logo} | words
         for name, value in given.items():
@@ -144,7 +148,8 @@ def report(
                 "two calibrations make a page (`output` report.html); stepdiag compare lists differences"
             )
     check_input(calibration)
-    read = read_calibration(calibration)
+    read = read_calibration(calibration) if page is None else page.calibration
+    before = None if page is None else page.before
     if path is not None:
         write_whole(path, functional_point_csv(read))
     if as_json:
@@ -176,8 +181,8 @@ def _write_page(
     logo: Path | None,
     language: str,
     words: Mapping[str, str | None],
-) -> Calibration | None:
-    """Write the page; the calibration before, if there is one."""
+) -> "Contents":
+    """Write the page; what it shows."""
     from stepdiag.presentation.page.contents import ReportRequest
     from stepdiag.presentation.page.document import write_report
     from stepdiag.units import MICROMETRE
@@ -190,7 +195,7 @@ def _write_page(
         contents = write_report(request, path)
     for note in contents.notes:
         tell("warning", note)
-    return contents.before
+    return contents
 
 
 @click.command(
